@@ -90,7 +90,7 @@ ARGUMENTS = {
         Plan.controls corners durations normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
         InteriorPoint.set_multipliers.values Problem.set_references.values rollout_many.us
-        Problem.set_contact.kp Problem.set_entry_weights.weights ControlRate.weights""",
+        Problem.set_contact.kp Problem.set_entry_weights.weights ControlRate.weights by_xs""",
     "float | ArrayLike": "Problem.set_weight.weight",
     'Literal["full_step"]': "stop",
     "int | None": "_casadi_hold_knot.t",
@@ -114,7 +114,7 @@ ARGUMENTS = {
         ArmMpc.frame Foot.point.frame Foot.sole.frame
         _Collisions.kind _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
         _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
-        text FrictionContact.frame Task.frame""",
+        text FrictionContact.frame Task.frame parameter""",
     "str | int": """
         body frame Model.with_mimic.follower Model.with_mimic.leader getVelocity.joint getAcceleration.joint
         getClassicalAcceleration.joint getJointJacobian.joint""",
@@ -142,7 +142,7 @@ ARGUMENTS = {
         regularisation
         restitution s smoothing spacing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
-        fade max_force min_force now then yaw_friction FrictionContact.friction""",
+        fade max_force min_force now then yaw_friction FrictionContact.friction step strictness""",
     "float | None": """
         DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings ArmMpc.budget WholeBodyMpc.budget
         WholeBodyMpc.command.height WholeBodyMpc.prepare.t""",
@@ -159,7 +159,7 @@ ARGUMENTS = {
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
     "bool": """
         _DistancePairs._evaluate.gradients _generate.external_forces batch frames mimic progress strict verbose
-        weightless_meshes FrictionCone.inner Unicycle.terminal _lend.versioned rollout_many.gradients
+        weightless_meshes by_knot FrictionCone.inner Unicycle.terminal _lend.versioned rollout_many.gradients
         rollout_many.states""",
     "list[tuple[int, Residual]]": " ".join(
         f"{kind}Dynamics._from_parts.written"
@@ -214,10 +214,12 @@ ARGUMENTS = {
     "_Action": "action Problem.set_knot.model Problem.terminal",
     "Sequence[_Action]": "models",
     "Sequence[int] | None": "knot_models",
-    "_Controls": "us",
+    "_Controls": "us by_us",
     "Problem": "problem",
     "Policy": "policy",
-    "AugmentedLagrangian | Fddp | InteriorPoint": "Record.solver",
+    "AugmentedLagrangian | Fddp | InteriorPoint": "Record.solver Sensitivity.solver",
+    'Literal["exact", "dynamics", "gauss_newton"]': "Sensitivity.curvature",
+    "Callable[[_Array], Problem]": "Sensitivity.define.build",
     # functions whose arguments are arrays of floats, or arrays of numbers that carry their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
     "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
@@ -271,7 +273,7 @@ RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
-        JointPolicy.__call__ WholeBodyMpc.forces
+        JointPolicy.__call__ Sensitivity.first_control_by_x0 Sensitivity.gradient WholeBodyMpc.forces
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Policy.__call__ Problem._between Problem.references
@@ -344,7 +346,7 @@ RESULTS = {
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_contact Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot
         Problem.set_knots Problem.set_references Problem.set_weight Problem.set_x0 Record.save Record.stop
-        Schedule.forget Schedule.switch Simulation.set_state WholeBodyController.track
+        Schedule.forget Schedule.switch Sensitivity.define Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "Plan": "WholeBodyMpc.plan",
     'tuple[_Array, Literal["solved", "relaxed", "stopped"], _Array, list[tuple[str, int]]]': "_DifferentialIk._step",
@@ -401,6 +403,9 @@ RESULTS = {
     "list[LqKnot]": "Problem.derivatives",
     "ManyRollouts": "rollout_many",
     "SweepResult": "Sweep.run",
+    "SensitivityReport": "Sensitivity.report",
+    "BoundGradients": "Sensitivity.bounds",
+    "tuple[_Array, _Array | list[_Array]]": "Sensitivity.jacobian",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution InteriorPoint.solution",
     "Outcome": "AugmentedLagrangian.outcome InteriorPoint.outcome",
     "Mapping[str, Any]": """

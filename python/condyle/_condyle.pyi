@@ -19,6 +19,7 @@ from ._types import (
     Actuator,
     AllTerms,
     AssemblySize,
+    BoundGradients,
     CentroidalDerivatives,
     CentroidalMap,
     CentroidalMapRate,
@@ -50,6 +51,7 @@ from ._types import (
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
+    SensitivityReport,
     Solution,
     Sphere,
     Spring,
@@ -108,6 +110,7 @@ __all__ = [
     "Record",
     "Residual",
     "Schedule",
+    "Sensitivity",
     "Simulation",
     "Sweep",
     "Task",
@@ -4905,6 +4908,116 @@ class Schedule:
         model: the index of the model.
 
         Raises `ProblemError` if t is not finite.
+        """
+
+@final
+class Sensitivity:
+    """The derivatives of a solver's last solution with respect to the parameters of its problem.
+
+    The optimality conditions are linearised at the solution and factorised once. After that, the gradient of a loss
+    with respect to a parameter is one pass over the knots, whatever the number of the parameter's entries.
+
+    A parameter has a name. "x0" is the initial state, and "duration" is the duration of all knots. A cost NAME has the
+    parameters "target/NAME", "weight/NAME" and "entry_weights/NAME", the weights of the entries of its residual.
+    "contact/NAME" is the placement of a contact. A parameter that several knots share changes at all of them. Changes
+    are in the tangent space: 2 nv numbers for a state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear
+    first. `define` adds parameters of your own.
+
+    Bounds that are active are held active. If `report.strict_complementarity` is False, a bound is active with a
+    multiplier near zero; the solution has a kink there, and the derivative on the other side differs.
+
+    solver: an `Fddp`, `InteriorPoint` or `AugmentedLagrangian` whose last solution has converged. The error of a
+        derivative is proportional to the error of the solution, so choose tight tolerances.
+    curvature: "exact" (default) takes second derivatives by differences of the first derivatives, for problems of all
+        kinds. "dynamics" adds the second derivatives of the dynamics, if the models provide them, to the Hessians of
+        the costs that the solver uses; it is exact if costs are quadratic in x and u. "gauss_newton" takes the
+        solver's Hessians of costs alone, and is an approximation.
+    tolerance: the largest residual of the optimality conditions that counts as converged, relative to their terms.
+    strictness: the smallest `report.margin` with strict complementarity.
+
+    Raises `ProblemError` if the solution has not converged, the problem has changed since the solve, a limit is soft,
+    or the solution is no strict minimum, so that derivatives do not exist.
+
+    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivity
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> rest, effort = Cost("rest", 1.0, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
+    >>> reach = Cost("reach", 10.0, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))
+    >>> knot, end = FreeDynamics(arm, 0.05, [rest, effort, reach]), FreeDynamics(arm, None, [rest])
+    >>> problem = Problem(x0, [knot], [0] * 10, end)
+    >>> solver = Fddp(problem)
+    >>> solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7))).status
+    'converged'
+    >>> sensitivity = Sensitivity(solver)
+    >>> by_us = np.zeros((10, 7))
+    >>> by_us[0, 1] = 1.0  # the loss is the first effort of the second joint
+    >>> sensitivity.gradient("target/reach", by_us=by_us).shape
+    (3,)
+    """
+
+    def __new__(
+        cls,
+        solver: AugmentedLagrangian | Fddp | InteriorPoint,
+        *,
+        curvature: Literal["exact", "dynamics", "gauss_newton"] = "exact",
+        tolerance: float = 0.001,
+        strictness: float = 0.0001,
+    ) -> Sensitivity: ...
+    @property
+    def report(self) -> SensitivityReport:
+        """The `SensitivityReport` on the solution: active bounds, residuals and strict complementarity."""
+
+    def bounds(self, by_xs: ArrayLike | None = None, by_us: _Controls | None = None) -> BoundGradients:
+        """Computes the gradients of a loss with respect to the initial state and to all active bounds, as
+        `BoundGradients`. They need no parameter.
+
+        by_xs, by_us: as for `gradient`.
+        """
+
+    def define(self, name: str, size: int, build: Callable[[_Array], Problem], step: float = 1e-05) -> None:
+        """Defines a parameter of your own, whose derivatives are central differences: the inertia of a body, a coefficient
+        of friction, or any other number of which problems are built.
+
+        name: the name, for `gradient` and `jacobian`. A parameter of this name is replaced.
+        size: the number of entries.
+        build: a function that returns the `Problem` for a change of the entries from the solved problem. It is called
+            twice for each entry.
+        step: the size of these changes.
+
+        Raises `ProblemError` if a problem has other dimensions, and exceptions of `build`.
+        """
+
+    def first_control_by_x0(self) -> _Array:
+        """Computes the derivative of the first control with respect to the initial state, (nu, ndx): the gradient of the
+        policy that a controller executes. Without active limits, it is a gain of the factorisation.
+        """
+
+    def gradient(
+        self, parameter: str, by_xs: ArrayLike | None = None, by_us: _Controls | None = None, by_knot: bool = False
+    ) -> _Array:
+        """Computes the gradient dL/dp of a loss L(x, u) with respect to a parameter, by the adjoint method.
+
+        The derivatives of the optimality conditions with respect to the parameter are computed at the first call for
+        this parameter, and stored.
+
+        parameter: the name of the parameter.
+        by_xs: the gradients of the loss with respect to the states, (N + 1, ndx), in the tangent space; None for zeros.
+        by_us: the gradients of the loss with respect to the controls, (N, nu), or a list of N arrays if knots differ in
+            nu; None for zeros.
+        by_knot: whether to return the part of each knot, (N + 1, n): the derivatives with respect to values of the
+            parameter that only this knot uses, such as the rows of `Problem.references`.
+
+        Raises `ProblemError` if the parameter does not exist, or if the problem has changed since this object was
+        created.
+        """
+
+    def jacobian(self, parameter: str) -> tuple[_Array, _Array | list[_Array]]:
+        """Computes the derivatives of all states and controls with respect to a parameter of n entries: an array
+        (N + 1, ndx, n), and an array (N, nu, n), or a list of N arrays if knots differ in nu. One pass over the knots
+        for each entry.
+
+        parameter: the name of the parameter.
+
+        Raises `ProblemError` as `gradient` does.
         """
 
 @final

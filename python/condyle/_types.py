@@ -876,6 +876,44 @@ class Violation(NamedTuple):
     """The distance from the bound, or the magnitude of the gap; infinite if this number is NaN."""
 
 
+class SensitivityReport(NamedTuple):
+    """The report of a `Sensitivity` on the solution at which it was computed."""
+
+    curvature: Literal["exact", "dynamics", "gauss_newton"]
+    """The second derivatives that were used."""
+    stationarity: float
+    """The largest gradient of the Lagrangian with respect to a free control, relative to its terms."""
+    primal: float
+    """The largest gap of the dynamics, or distance of an active constraint from its bound."""
+    active_controls: int
+    """The number of controls at a bound, over all knots."""
+    active_rows: int
+    """The number of active rows of limits, over all knots. Equalities are always active."""
+    strict_complementarity: bool
+    """Whether each inequality is clearly active or clearly inactive: `margin` is at least `strictness`. If not, the
+    solution has a kink nearby, and the derivative on the other side of the kink differs.
+    """
+    margin: float
+    """The smallest value, over all inequalities, of the larger one of multiplier and distance from the bound."""
+    weakest: tuple[Literal["control_bound", "constraint"], int, int] | None
+    """The inequality with that value: its kind, its knot, and its control or row; None without inequalities."""
+
+
+class BoundGradients(NamedTuple):
+    """The gradients of a loss with respect to the initial state and to active bounds, from `Sensitivity.bounds`."""
+
+    x0: _Array
+    """The gradient with respect to the initial state, ndx numbers in its tangent space."""
+    control_bounds: _Array | list[_Array]
+    """The gradients with respect to the bounds on controls, (N, nu), or a list of N arrays if knots differ in nu; zero
+    for controls that are not at a bound.
+    """
+    row_bounds: list[_Array]
+    """The gradients with respect to the bounds of limits, for the rows of each knot in the order of
+    `Outcome.multipliers`; zero for rows that are not active. Both bounds of an equality move.
+    """
+
+
 class Outcome(NamedTuple):
     """The violation of limits and other results of a solve of `AugmentedLagrangian` or `InteriorPoint`, in addition to
     its `Solution`.

@@ -23,6 +23,8 @@ You can define your own actions by the next state and the cost (`Action`), by ac
 functions accept numbers that carry their derivatives. `ControlRate` adds a cost of the change of the controls from knot
 to knot to an action of any kind.
 
+`Sensitivity` differentiates a solution with respect to initial state, targets, weights, bounds and other parameters.
+
 The feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. The iterates are the same as in
 Crocoddyl.
 """
@@ -52,12 +54,14 @@ from ._condyle import (
     Record,
     Residual,
     Schedule,
+    Sensitivity,
     Sweep,
     Unicycle,
     WrenchCone,
     rollout_many,
 )
 from ._types import (
+    BoundGradients,
     ConstraintRows,
     Difference,
     Evaluation,
@@ -67,6 +71,7 @@ from ._types import (
     Outcome,
     PlanPoint,
     RecordedTick,
+    SensitivityReport,
     Solution,
     Sphere,
     SweepResult,
@@ -78,6 +83,7 @@ __all__ = [
     "Action",
     "Activation",
     "AugmentedLagrangian",
+    "BoundGradients",
     "ConstrainedAction",
     "ConstraintRows",
     "ContactDynamics",
@@ -107,6 +113,8 @@ __all__ = [
     "RecordedTick",
     "Residual",
     "Schedule",
+    "Sensitivity",
+    "SensitivityReport",
     "Solution",
     "Sphere",
     "Sweep",

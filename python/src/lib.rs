@@ -131,8 +131,8 @@ mod _condyle {
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,
         ControlRate, Cost, DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics,
-        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sweep, Unicycle, WrenchCone,
-        rollout_many,
+        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivity, Sweep, Unicycle,
+        WrenchCone, rollout_many,
     };
     #[pymodule_export]
     use regressors::{

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp, InteriorPoint, Problem
+from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp, InteriorPoint, Problem, Sensitivity
 
 
 class Marker:
@@ -46,6 +46,7 @@ MAKERS: dict[str, Any] = {
     "Problem": lambda f, g: problem(action(f)),
     "Problem, constrained": lambda f, g: problem(ConstrainedAction(action(f), 1, g)),
     "Fddp": lambda f, g: solved(Fddp, action(f)),
+    "Sensitivity": lambda f, g: Sensitivity(solved(Fddp, action(f)), curvature="gauss_newton"),
     "AugmentedLagrangian": lambda f, g: solved(AugmentedLagrangian, ConstrainedAction(action(f), 1, g)),
     "InteriorPoint": lambda f, g: solved(InteriorPoint, ConstrainedAction(action(f), 1, g)),
 }

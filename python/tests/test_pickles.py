@@ -21,7 +21,7 @@ PROBLEM = Problem(np.zeros(14), [STEP], [0] * 3, FreeDynamics(ARM, None, []))
 
 # Classes of computations in progress, such as factors and builders.
 UNDER_WAY = {
-    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Policy", "Record", "Sweep",
+    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Policy", "Record", "Sensitivity", "Sweep",
 }  # fmt: skip
 
 

@@ -214,6 +214,13 @@ pub enum Error {
         knot: usize,
     },
 
+    /// The derivatives of a solution cannot be computed, or a parameter does not exist.
+    #[error("sensitivity: {what}")]
+    Sensitivity {
+        /// Description of the fault, including the invalid numbers.
+        what: String,
+    },
+
     /// A setting is outside its valid range.
     #[error("setting `{name}` is {value}, but it must be {allowed}")]
     Setting {

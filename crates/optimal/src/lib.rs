@@ -18,6 +18,7 @@
 //!   actions, a robot's [`Limit`](robot::Limit)s and bounds on controls. Each iteration is one sweep.
 //!   [`tick`](InteriorPoint::tick) makes a fixed number of sweeps, for model-predictive control.
 //! - [`AugmentedLagrangian`] imposes the same constraints by repeated solves with [`Fddp`].
+//! - [`Sensitivity`] differentiates a solution with respect to initial state, targets, weights and other parameters.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
 //! - [`ControlRate`] adds a cost, and limits, of the change of the controls from knot to knot to any action.
 //! - [`AutoDiff`] turns dynamics and a cost that are generic over the scalar type into an action with exact derivatives
@@ -87,6 +88,7 @@ mod read;
 #[cfg(feature = "serde")]
 pub mod record;
 pub mod robot;
+mod sensitivity;
 mod solvers;
 mod time;
 
@@ -98,6 +100,10 @@ pub use nalgebra;
 pub use problem::{
     ActionModel, AutoDiff, AutoDiffConstraint, Constrained, ControlRate, GenericAction, GenericConstraint, GroupModel,
     Lqr, NumDiff, PathConstraint, Problem, RolloutResults, Rollouts, Schedule, Unicycle,
+};
+pub use sensitivity::{
+    Adjoint, Curvature, Parameter, ParameterJacobian, Sensitivity, SensitivityReport, SensitivitySettings,
+    SolutionJacobian, WeakestBound,
 };
 pub use solvers::{
     AugmentedLagrangian, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,

@@ -16,16 +16,21 @@ pub(super) fn common_nu(problem: &rust::Problem) -> Option<usize> {
 
 /// Reads the controls of all knots, knot by knot, from an array (N, nu) or a list of arrays.
 pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    named_controls("us", problem, us)
+}
+
+/// Reads numbers of the controls of all knots, as [`controls`] does, from the argument `name`.
+pub(super) fn named_controls(name: &str, problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     if let Some(nu) = common_nu(problem) {
-        return Ok(matrix("us", us, [problem.horizon(), nu])?.to_vec());
+        return Ok(matrix(name, us, [problem.horizon(), nu])?.to_vec());
     }
     let (found, expected) = (us.len()?, problem.horizon());
     if found != expected {
-        return Err(PyValueError::new_err(format!("us: expected {expected} arrays, found {found}")));
+        return Err(PyValueError::new_err(format!("{name}: expected {expected} arrays, found {found}")));
     }
     let mut flat = Vec::new();
     for t in 0..expected {
-        flat.extend_from_slice(&vector(&format!("us[{t}]"), &us.get_item(t)?, problem.nu(t))?);
+        flat.extend_from_slice(&vector(&format!("{name}[{t}]"), &us.get_item(t)?, problem.nu(t))?);
     }
     Ok(flat)
 }

@@ -178,6 +178,14 @@ impl Activation {
         }
     }
 
+    /// Returns the weights of the entries of the residual; `None` for an activation without weights.
+    pub(super) fn weights(&self) -> Option<&[f64]> {
+        match self {
+            Self::Weighted(weights) | Self::WeightedBarrier { weights, .. } => Some(weights),
+            _ => None,
+        }
+    }
+
     /// Returns an error message if this activation is invalid or does not fit a residual with n entries.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {

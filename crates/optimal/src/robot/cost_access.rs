@@ -27,6 +27,11 @@ impl CostMut<'_> {
         self.cost
     }
 
+    /// Returns the robot.
+    pub(super) fn model(&self) -> &Model {
+        self.model
+    }
+
     /// Returns the target of the residual; `None` if the residual has no target.
     pub fn target(&self) -> Option<Target<'_>> {
         self.cost.residual.target()

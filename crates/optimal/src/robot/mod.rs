@@ -64,6 +64,7 @@ mod integrators;
 mod knot_data;
 mod limits;
 mod motion;
+mod nudge;
 mod outputs;
 mod own_constraint;
 mod problem;
@@ -90,6 +91,7 @@ pub use dynamics::inverse_contact::{ContactInverseDynamics, ControlledContactAcc
 pub use integrators::{ControlPolynomial, Integrated, Integrator};
 pub use limits::Limit;
 pub use motion::{ContactForce, KnotMotion};
+pub(crate) use nudge::Nudge;
 pub use own_constraint::OwnConstraint;
 pub use problem::{ControlBounds, ControlChange, Dynamics, Knot, RobotProblem};
 pub use residuals::autodiff::{GenericResidual, RobotState};

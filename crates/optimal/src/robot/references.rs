@@ -51,7 +51,7 @@ impl Target<'_> {
     }
 
     /// Returns the target of the same kind with the given [`size`](Self::size) numbers.
-    fn read<'n>(&self, numbers: &'n [f64]) -> Target<'n> {
+    pub(super) fn of_numbers<'n>(&self, numbers: &'n [f64]) -> Target<'n> {
         let rotation = |stride: usize| {
             let column = |j: usize| Vec3::new(numbers[j], numbers[stride + j], numbers[2 * stride + j]);
             Mat3 { x: column(0), y: column(1), z: column(2) }
@@ -88,7 +88,7 @@ impl CostMut<'_> {
         if matches!(target, Target::Placement(_)) && numbers[12..] != [0.0, 0.0, 0.0, 1.0] {
             return wrong(self, format!("the last row of its target is {:?}, expected 0, 0, 0, 1", &numbers[12..]));
         }
-        let target = target.read(numbers);
+        let target = target.of_numbers(numbers);
         self.set_target(target)
     }
 }

@@ -21,7 +21,7 @@ pub(super) struct Measured {
 
 impl Problem {
     /// Calls `visit` for the constraints of knot t, in their order.
-    pub(super) fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+    pub(crate) fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         if let Some(group) = self.action_mut(t).knot_group_mut() {
             group.constraints(t, visit);
         }

@@ -1,0 +1,309 @@
+//! Derivatives of solutions with respect to the parameters of their problem.
+
+use super::evaluation::{by_knot, named_controls};
+use super::problem::{Problem, lock};
+use super::solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
+use crate::arrays::{Give, class, matrix, output};
+use crate::exceptions::{problem_error, within, wrong_word};
+use condyle::optimal as rust;
+use pyo3::exceptions::PyTypeError;
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use rust::{Curvature, Parameter, ParameterJacobian, SensitivitySettings};
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+/// Maximum number of entries of a parameter of one's own.
+const MOST_ENTRIES: usize = 4096;
+
+/// The derivatives of a solver's last solution with respect to the parameters of its problem.
+///
+/// The optimality conditions are linearised at the solution and factorised once. After that, the gradient of a loss
+/// with respect to a parameter is one pass over the knots, whatever the number of the parameter's entries.
+///
+/// A parameter has a name. "x0" is the initial state, and "duration" is the duration of all knots. A cost NAME has the
+/// parameters "target/NAME", "weight/NAME" and "entry_weights/NAME", the weights of the entries of its residual.
+/// "contact/NAME" is the placement of a contact. A parameter that several knots share changes at all of them. Changes
+/// are in the tangent space: 2 nv numbers for a state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear
+/// first. `define` adds parameters of your own.
+///
+/// Bounds that are active are held active. If `report.strict_complementarity` is False, a bound is active with a
+/// multiplier near zero; the solution has a kink there, and the derivative on the other side differs.
+///
+/// solver: an `Fddp`, `InteriorPoint` or `AugmentedLagrangian` whose last solution has converged. The error of a
+///     derivative is proportional to the error of the solution, so choose tight tolerances.
+/// curvature: "exact" (default) takes second derivatives by differences of the first derivatives, for problems of all
+///     kinds. "dynamics" adds the second derivatives of the dynamics, if the models provide them, to the Hessians of
+///     the costs that the solver uses; it is exact if costs are quadratic in x and u. "gauss_newton" takes the
+///     solver's Hessians of costs alone, and is an approximation.
+/// tolerance: the largest residual of the optimality conditions that counts as converged, relative to their terms.
+/// strictness: the smallest `report.margin` with strict complementarity.
+///
+/// Raises `ProblemError` if the solution has not converged, the problem has changed since the solve, a limit is soft,
+/// or the solution is no strict minimum, so that derivatives do not exist.
+///
+/// >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivity
+/// >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+/// >>> rest, effort = Cost("rest", 1.0, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
+/// >>> reach = Cost("reach", 10.0, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))
+/// >>> knot, end = FreeDynamics(arm, 0.05, [rest, effort, reach]), FreeDynamics(arm, None, [rest])
+/// >>> problem = Problem(x0, [knot], [0] * 10, end)
+/// >>> solver = Fddp(problem)
+/// >>> solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7))).status
+/// 'converged'
+/// >>> sensitivity = Sensitivity(solver)
+/// >>> by_us = np.zeros((10, 7))
+/// >>> by_us[0, 1] = 1.0  # the loss is the first effort of the second joint
+/// >>> sensitivity.gradient("target/reach", by_us=by_us).shape
+/// (3,)
+#[pyclass(frozen, module = "condyle.optimal")]
+pub(crate) struct Sensitivity {
+    problem: Py<Problem>,
+    inner: Mutex<rust::Sensitivity>,
+    jacobians: Mutex<HashMap<String, ParameterJacobian>>,
+}
+
+#[pymethods]
+impl Sensitivity {
+    #[new]
+    #[pyo3(signature = (solver, *, curvature="exact", tolerance=1e-3, strictness=1e-4))]
+    fn new(solver: &Bound<'_, PyAny>, curvature: &str, tolerance: f64, strictness: f64) -> PyResult<Self> {
+        let curvature = match curvature {
+            "exact" => Curvature::Exact,
+            "dynamics" => Curvature::Dynamics,
+            "gauss_newton" => Curvature::GaussNewton,
+            other => return Err(wrong_word("curvature", "'exact', 'dynamics' or 'gauss_newton'", other)),
+        };
+        let settings = SensitivitySettings { curvature, tolerance, strictness };
+        let py = solver.py();
+        if let Ok(solver) = solver.cast::<Fddp>() {
+            let (solver, problem) = (lock("solver", &solver.get().solver)?, &solver.get().problem);
+            Self::of(py, problem, solver.solution(), None, settings)
+        } else if let Ok(solver) = solver.cast::<InteriorPoint>() {
+            let (solver, problem) = (lock("solver", &solver.get().solver)?, &solver.get().problem);
+            Self::of(py, problem, solver.solution(), Some(solver.outcome()), settings)
+        } else if let Ok(solver) = solver.cast::<AugmentedLagrangian>() {
+            let (solver, problem) = (lock("solver", &solver.get().solver)?, &solver.get().problem);
+            Self::of(py, problem, solver.solution(), Some(solver.outcome()), settings)
+        } else {
+            Err(PyTypeError::new_err(format!(
+                "solver: expected an Fddp, InteriorPoint or AugmentedLagrangian, found {}",
+                solver.get_type().name()?
+            )))
+        }
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.problem)
+    }
+
+    /// The `SensitivityReport` on the solution: active bounds, residuals and strict complementarity.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let inner = lock("sensitivity", &self.inner)?;
+        let report = inner.report();
+        let weakest = report.weakest.map(|weakest| {
+            let kind = match weakest.kind {
+                rust::ViolationKind::ControlBound => "control_bound",
+                _ => "constraint",
+            };
+            (kind, weakest.knot, weakest.row)
+        });
+        class!(py, "SensitivityReport")?.call1((
+            report.curvature.name(),
+            report.stationarity,
+            report.primal,
+            report.active_controls,
+            report.active_rows,
+            report.strict_complementarity,
+            report.margin,
+            weakest,
+        ))
+    }
+
+    /// Computes the gradient dL/dp of a loss L(x, u) with respect to a parameter, by the adjoint method.
+    ///
+    /// The derivatives of the optimality conditions with respect to the parameter are computed at the first call for
+    /// this parameter, and stored.
+    ///
+    /// parameter: the name of the parameter.
+    /// by_xs: the gradients of the loss with respect to the states, (N + 1, ndx), in the tangent space; None for zeros.
+    /// by_us: the gradients of the loss with respect to the controls, (N, nu), or a list of N arrays if knots differ in
+    ///     nu; None for zeros.
+    /// by_knot: whether to return the part of each knot, (N + 1, n): the derivatives with respect to values of the
+    ///     parameter that only this knot uses, such as the rows of `Problem.references`.
+    ///
+    /// Raises `ProblemError` if the parameter does not exist, or if the problem has changed since this object was
+    /// created.
+    #[pyo3(signature = (parameter, by_xs=None, by_us=None, by_knot=false))]
+    fn gradient<'py>(
+        &self,
+        py: Python<'py>,
+        parameter: &str,
+        by_xs: Option<&Bound<'py, PyAny>>,
+        by_us: Option<&Bound<'py, PyAny>>,
+        by_knot: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.find(parameter)?;
+        let mut inner = lock("sensitivity", &self.inner)?;
+        let [by_states, by_controls] = self.loss(by_xs, by_us)?;
+        let jacobians = lock("sensitivity", &self.jacobians)?;
+        let jacobian = &jacobians[parameter];
+        let adjoint = inner.adjoint(&by_states, &by_controls).map_err(problem_error)?;
+        if !by_knot {
+            return adjoint.gradient(jacobian).give(py, None);
+        }
+        let parts = adjoint.gradient_by_knot(jacobian);
+        output(py, None, &[parts.len(), jacobian.size()], |out| out.copy_from_slice(&parts.concat()))
+    }
+
+    /// Computes the gradients of a loss with respect to the initial state and to all active bounds, as
+    /// `BoundGradients`. They need no parameter.
+    ///
+    /// by_xs, by_us: as for `gradient`.
+    #[pyo3(signature = (by_xs=None, by_us=None))]
+    fn bounds<'py>(
+        &self,
+        py: Python<'py>,
+        by_xs: Option<&Bound<'py, PyAny>>,
+        by_us: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut inner = lock("sensitivity", &self.inner)?;
+        let [by_states, by_controls] = self.loss(by_xs, by_us)?;
+        let adjoint = inner.adjoint(&by_states, &by_controls).map_err(problem_error)?;
+        let problem = lock("problem", &self.problem.get().inner)?;
+        let of_controls = by_knot(py, &problem, &[], |t, out| {
+            out.copy_from_slice(&adjoint.control_bounds[problem.control_range(t)]);
+        })?;
+        let rows = adjoint.row_bounds.iter().map(|rows| rows.give(py, None)).collect::<PyResult<Vec<_>>>()?;
+        class!(py, "BoundGradients")?.call1((adjoint.x0.give(py, None)?, of_controls, rows))
+    }
+
+    /// Computes the derivatives of all states and controls with respect to a parameter of n entries: an array
+    /// (N + 1, ndx, n), and an array (N, nu, n), or a list of N arrays if knots differ in nu. One pass over the knots
+    /// for each entry.
+    ///
+    /// parameter: the name of the parameter.
+    ///
+    /// Raises `ProblemError` as `gradient` does.
+    fn jacobian<'py>(&self, py: Python<'py>, parameter: &str) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        self.find(parameter)?;
+        let mut inner = lock("sensitivity", &self.inner)?;
+        let jacobians = lock("sensitivity", &self.jacobians)?;
+        let found = inner.forward(&jacobians[parameter]).map_err(problem_error)?;
+        let problem = lock("problem", &self.problem.get().inner)?;
+        let (ndx, n) = (problem.ndx(), found.xs.ncols());
+        let rows = |of: &nalgebra::DMatrix<f64>, first: usize, out: &mut [f64]| {
+            for (row, out) in (first..).zip(out.chunks_exact_mut(n)) {
+                out.iter_mut().zip(of.row(row).iter()).for_each(|(out, x)| *out = *x);
+            }
+        };
+        let xs = output(py, None, &[problem.horizon() + 1, ndx, n], |out| rows(&found.xs, 0, out))?;
+        let us = by_knot(py, &problem, &[n], |t, out| rows(&found.us, problem.control_range(t).start, out))?;
+        Ok((xs, us))
+    }
+
+    /// Defines a parameter of your own, whose derivatives are central differences: the inertia of a body, a coefficient
+    /// of friction, or any other number of which problems are built.
+    ///
+    /// name: the name, for `gradient` and `jacobian`. A parameter of this name is replaced.
+    /// size: the number of entries.
+    /// build: a function that returns the `Problem` for a change of the entries from the solved problem. It is called
+    ///     twice for each entry.
+    /// step: the size of these changes.
+    ///
+    /// Raises `ProblemError` if a problem has other dimensions, and exceptions of `build`.
+    #[pyo3(signature = (name, size, build, step=1e-5))]
+    fn define(&self, name: &str, size: usize, build: &Bound<'_, PyAny>, step: f64) -> PyResult<()> {
+        let size = within("size", size, 1, MOST_ENTRIES)?;
+        let (py, mut raised) = (build.py(), None);
+        let inner = lock("sensitivity", &self.inner)?;
+        let problem = lock("problem", &self.problem.get().inner)?;
+        let found = inner.jacobian_with(&problem, size, step, |change, evaluate| {
+            let built = (|| {
+                let problem = build.call1((change.give(py, None)?,))?;
+                let problem = problem.cast::<Problem>().map_err(|_| {
+                    let found = problem.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
+                    PyTypeError::new_err(format!("build: expected to return a Problem, found {found}"))
+                })?;
+                let result = evaluate(&mut *lock("the problem that build returned", &problem.get().inner)?);
+                problem.get().raise()?;
+                result.map_err(problem_error)
+            })();
+            built.map_err(|error| {
+                raised = Some(error);
+                rust::Error::Sensitivity { what: "`build` has raised an exception".to_owned() }
+            })
+        });
+        match (found, raised) {
+            (_, Some(error)) => Err(error),
+            (found, None) => {
+                lock("sensitivity", &self.jacobians)?.insert(name.to_owned(), found.map_err(problem_error)?);
+                Ok(())
+            }
+        }
+    }
+
+    /// Computes the derivative of the first control with respect to the initial state, (nu, ndx): the gradient of the
+    /// policy that a controller executes. Without active limits, it is a gain of the factorisation.
+    fn first_control_by_x0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        lock("sensitivity", &self.inner)?.first_control_by_x0().map_err(problem_error)?.give(py, None)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let inner = lock("sensitivity", &self.inner)?;
+        let report = inner.report();
+        Ok(format!(
+            "<condyle.optimal.Sensitivity: curvature {}, {} active controls, {} active rows>",
+            report.curvature.name(),
+            report.active_controls,
+            report.active_rows
+        ))
+    }
+}
+
+impl Sensitivity {
+    /// Linearises the optimality conditions at a solution. Other Python threads can run meanwhile.
+    fn of(
+        py: Python<'_>,
+        problem: &Py<Problem>,
+        solution: &rust::Solution,
+        outcome: Option<&rust::Outcome>,
+        settings: SensitivitySettings,
+    ) -> PyResult<Self> {
+        let mut inner = lock("problem", &problem.get().inner)?;
+        let inner = &mut *inner;
+        let found = py.detach(|| rust::Sensitivity::new(inner, solution, outcome, settings));
+        problem.get().raise()?;
+        let (found, jacobians) = (Mutex::new(found.map_err(problem_error)?), Mutex::default());
+        Ok(Self { problem: problem.clone_ref(py), inner: found, jacobians })
+    }
+
+    /// Computes the derivatives with respect to a named parameter, unless they are stored.
+    fn find(&self, name: &str) -> PyResult<()> {
+        let mut jacobians = lock("sensitivity", &self.jacobians)?;
+        if !jacobians.contains_key(name) {
+            let parameter: Parameter = name.parse().map_err(problem_error)?;
+            let inner = lock("sensitivity", &self.inner)?;
+            let found = inner.jacobian(&mut *lock("problem", &self.problem.get().inner)?, &parameter);
+            self.problem.get().raise()?;
+            jacobians.insert(name.to_owned(), found.map_err(problem_error)?);
+        }
+        Ok(())
+    }
+
+    /// Reads the gradients of a loss.
+    fn loss(&self, by_xs: Option<&Bound<'_, PyAny>>, by_us: Option<&Bound<'_, PyAny>>) -> PyResult<[Vec<f64>; 2]> {
+        let problem = lock("problem", &self.problem.get().inner)?;
+        let (rows, ndx) = (problem.horizon() + 1, problem.ndx());
+        let by_states = match by_xs {
+            Some(by_xs) => matrix("by_xs", by_xs, [rows, ndx])?.to_vec(),
+            None => vec![0.0; rows * ndx],
+        };
+        let by_controls = match by_us {
+            Some(by_us) => named_controls("by_us", &problem, by_us)?,
+            None => vec![0.0; problem.control_range(rows - 1).start],
+        };
+        Ok([by_states, by_controls])
+    }
+}
