@@ -100,8 +100,8 @@ pub use problem::{
     Lqr, NumDiff, PathConstraint, Problem, RolloutResults, Rollouts, Schedule, Unicycle,
 };
 pub use solvers::{
-    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,
-    Iteration, LimitRows, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution,
+    AugmentedLagrangian, BatchFddp, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,
+    Iteration, LimitRows, ManyProblems, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution,
     StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]

@@ -464,6 +464,17 @@ impl Problem {
         Ok(bounded)
     }
 
+    /// Returns whether each knot of both problems can be computed in one batch: the problems have the same shape, and
+    /// differ only in durations, weights, targets and bounds. Actions without groups are always computed one by one.
+    pub(crate) fn matches(&self, other: &Self) -> bool {
+        let knot_matches = |t: usize| match (self.action(t).knot_group(), other.action(t).knot_group()) {
+            (Some(own), Some(_)) => own.matches(other.action(t), t),
+            (None, None) => true,
+            _ => false,
+        };
+        self.shape.check(&other.shape).is_ok() && (0..=self.horizon()).all(knot_matches)
+    }
+
     /// Returns the largest number of lanes among all models.
     pub(crate) fn lanes(&self) -> usize {
         self.models.lanes.iter().copied().max().unwrap_or(1)
