@@ -57,6 +57,7 @@ from ._condyle import (
     WrenchCone,
     rollout_many,
 )
+from ._sweep import solve_many
 from ._types import (
     ConstraintRows,
     Difference,
@@ -117,5 +118,6 @@ __all__ = [
     "WrenchCone",
     "ode_action",
     "rollout_many",
+    "solve_many",
     "thrusters",
 ]

@@ -100,9 +100,9 @@ pub use problem::{
     Lqr, NumDiff, PathConstraint, Problem, RolloutResults, Rollouts, Schedule, Unicycle,
 };
 pub use solvers::{
-    AugmentedLagrangian, BatchFddp, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,
-    Iteration, LimitRows, ManyProblems, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution,
-    StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
+    AugmentedLagrangian, BatchFddp, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint,
+    InteriorPointSettings, Iteration, LimitRows, ManyProblems, Observer, Outcome, PlanPoint, Policy, PolicyPoint,
+    PolicyPublisher, Settings, Solution, StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

@@ -7,6 +7,7 @@ use super::solution::{Iteration, Solution, Status};
 use super::solver_loop::{Pass, Progress, SolverLoop};
 use super::watch::{Observer, Watch};
 use crate::error::Error;
+use crate::lq::{LqKnot, Sweep};
 use crate::problem::Problem;
 use crate::solvers::fddp::Fddp;
 use crate::time::Instant;
@@ -22,16 +23,20 @@ const PERIOD: Duration = Duration::from_millis(10);
 ///
 /// The methods are called from several threads, for one problem after the other, in any order.
 pub trait ManyProblems: Sync {
+    /// Error that excludes a problem.
+    type Error: From<Error>;
+
     /// Prepares problem `i`. `problem` is a copy of the nominal problem, which may have been changed for an earlier
     /// problem: this method must set everything that differs between problems. `xs` ((N + 1)·nx) and `us` contain the
     /// nominal warm start, which this method may change.
     ///
     /// # Errors
-    /// An [`Error`] that excludes this problem. It is passed to [`solved`](Self::solved).
-    fn start(&self, i: usize, problem: &mut Problem, xs: &mut [f64], us: &mut [f64]) -> Result<(), Error>;
+    /// An error that excludes this problem. It is passed to [`solved`](Self::solved).
+    fn start(&self, i: usize, problem: &mut Problem, xs: &mut [f64], us: &mut [f64]) -> Result<(), Self::Error>;
 
-    /// Receives the solution of problem `i`, or the error that excluded it. `problem` is as `start` left it.
-    fn solved(&self, i: usize, problem: &Problem, result: Result<&Solution, Error>);
+    /// Receives the solution of problem `i`, or the error that excluded it. `problem` is as `start` left it, and is
+    /// used for a later problem.
+    fn solved(&self, i: usize, problem: &mut Problem, result: Result<&Solution, Self::Error>);
 
     /// Returns whether to continue. This method is called at most every 10 ms on each thread.
     fn go_on(&self) -> ControlFlow<()> {
@@ -40,7 +45,7 @@ pub trait ManyProblems: Sync {
 }
 
 /// Solver of many problems that have the same shape: the same numbers of knots, states and controls, and the same kinds
-/// of dynamics and costs. The problems may differ in their data: initial states, targets, weights, bounds and durations.
+/// of dynamics and costs. The problems may differ in initial states, targets, weights, bounds and durations.
 ///
 /// As many problems as a SIMD register has lanes are solved together. Each problem has its own iterations of [`Fddp`]:
 /// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. A
@@ -59,12 +64,14 @@ pub trait ManyProblems: Sync {
 /// struct Starts { x0: Vec<f64>, costs: Mutex<Vec<f64>> }
 ///
 /// impl ManyProblems for Starts {
+///     type Error = Error;
+///
 ///     fn start(&self, i: usize, problem: &mut Problem, xs: &mut [f64], _: &mut [f64]) -> Result<(), Error> {
 ///         xs.fill(self.x0[i]);
 ///         problem.set_x0(&self.x0[i..=i])
 ///     }
 ///
-///     fn solved(&self, i: usize, _: &Problem, result: Result<&Solution, Error>) {
+///     fn solved(&self, i: usize, _: &mut Problem, result: Result<&Solution, Error>) {
 ///         self.costs.lock().unwrap()[i] = result.map_or(f64::NAN, |solution| solution.cost);
 ///     }
 /// }
@@ -96,8 +103,17 @@ struct Worker {
     start: [Vec<f64>; 2],
     slots: Vec<Slot>,
     trials: Trials,
+    /// Linear-quadratic problem and sweep, which all slots use in turn, so that they stay in the caches.
+    linear: Linear,
     /// Solver of a problem that cannot share lanes.
     alone: Option<Fddp>,
+}
+
+/// Storage of a linear-quadratic problem, and its sweep.
+#[derive(Debug)]
+struct Linear {
+    knots: Vec<LqKnot>,
+    sweep: Sweep,
 }
 
 /// Place for one of the problems that are solved together.
@@ -121,8 +137,8 @@ struct Task {
 }
 
 /// Distribution of the problems of a call among the threads.
-struct Queue<'a> {
-    problems: &'a dyn ManyProblems,
+struct Queue<'a, P> {
+    problems: &'a P,
     settings: &'a Settings,
     count: usize,
     next: AtomicUsize,
@@ -177,7 +193,7 @@ impl BatchFddp {
     ///
     /// # Errors
     /// [`Error::Setting`] for an invalid setting.
-    pub fn solve(&mut self, count: usize, problems: &dyn ManyProblems) -> Result<usize, Error> {
+    pub fn solve(&mut self, count: usize, problems: &impl ManyProblems) -> Result<usize, Error> {
         self.settings.check()?;
         let settings = Settings { threads: 1, segments: 1, time_budget: None, ..self.settings.clone() };
         let queue = Queue {
@@ -195,7 +211,7 @@ impl BatchFddp {
 }
 
 /// Lets each worker solve problems of the queue.
-fn spread(workers: &mut [Worker], queue: &Queue<'_>, budget: Option<Duration>) {
+fn spread<P: ManyProblems>(workers: &mut [Worker], queue: &Queue<'_, P>, budget: Option<Duration>) {
     match workers {
         [worker] => worker.run(queue, budget),
         workers => {
@@ -205,7 +221,7 @@ fn spread(workers: &mut [Worker], queue: &Queue<'_>, budget: Option<Duration>) {
     }
 }
 
-impl Queue<'_> {
+impl<P: ManyProblems> Queue<'_, P> {
     /// Returns the index of the next problem, unless all problems have started or the call ends early.
     fn take(&self) -> Option<usize> {
         if self.is_over.load(Ordering::Relaxed) || self.is_interrupted.load(Ordering::Relaxed) {
@@ -239,19 +255,21 @@ impl Worker {
     /// Creates the solver of one thread.
     fn new(problem: &Problem, [xs, us]: [&[f64]; 2]) -> Result<Self, Error> {
         let width = problem.lanes();
-        let slot = || {
-            let problem = problem.try_clone()?;
-            Ok(Slot { solver: SolverLoop::with_trials(&problem, 1), problem, task: None })
-        };
         let nominal = problem.try_clone()?;
+        let slot = || {
+            let problem = problem.try_clone_beside(&nominal)?;
+            Ok(Slot { solver: SolverLoop::for_batch(&problem), problem, task: None })
+        };
         let mut trials = Trials::new(&nominal, width);
         trials.keep_motions(nominal.motion_size());
         let slots = (0..width).map(|_| slot()).collect::<Result<_, Error>>()?;
-        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, alone: None })
+        let knots = SolverLoop::knots_of(&nominal);
+        let linear = Linear { sweep: Sweep::new(&knots), knots };
+        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, linear, alone: None })
     }
 
     /// Solves problems until the queue is empty or a reason to stop exists.
-    fn run(&mut self, queue: &Queue<'_>, budget: Option<Duration>) {
+    fn run<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, budget: Option<Duration>) {
         let mut asked = Instant::now();
         loop {
             let stop = queue.stops(budget, &mut asked);
@@ -259,7 +277,7 @@ impl Worker {
                 if let Some(status) = stop
                     && let Some(task) = self.slots[k].task.take()
                 {
-                    self.slots[k].end(queue, task, status);
+                    self.slots[k].end(queue, task, status, &mut self.linear);
                 }
                 while stop.is_none() && self.slots[k].task.is_none() {
                     let Some(index) = queue.take() else { break };
@@ -274,8 +292,8 @@ impl Worker {
     }
 
     /// Begins problem `index` in slot k. A problem that cannot share lanes is solved at once.
-    fn begin(&mut self, k: usize, index: usize, queue: &Queue<'_>) {
-        let Self { nominal, start, slots, alone, .. } = self;
+    fn begin<P: ManyProblems>(&mut self, k: usize, index: usize, queue: &Queue<'_, P>) {
+        let Self { nominal, start, slots, alone, linear, .. } = self;
         let Slot { problem, solver, .. } = &mut slots[k];
         let begin = Instant::now();
         let [mut xs, mut us] = start.clone();
@@ -286,21 +304,27 @@ impl Worker {
         if !problem.matches(nominal) {
             let alone = alone.get_or_insert_with(|| Fddp::new(nominal));
             alone.settings = queue.settings.clone();
-            let result = alone.solve(problem, &xs, &us);
+            let result = alone.solve(problem, &xs, &us).map_err(P::Error::from);
             return queue.problems.solved(index, problem, result);
         }
-        if let Err(error) = solver.begin(problem, queue.settings, Some([&xs, &us])) {
-            return queue.problems.solved(index, problem, Err(error));
-        }
-        solver.start_clock(queue.settings, &Watch::new(&mut Unobserved));
-        let now = solver.start_pass(problem, queue.settings, Pass::default());
+        solver.exchange(&mut linear.knots, &mut linear.sweep, false);
+        let begun = solver.begin(problem, queue.settings, Some([&xs, &us]));
+        let now = begun.map(|()| {
+            solver.start_clock(queue.settings, &Watch::new(&mut Unobserved));
+            solver.start_pass(problem, queue.settings, Pass::default())
+        });
+        solver.exchange(&mut linear.knots, &mut linear.sweep, false);
+        let now = match now {
+            Ok(now) => now,
+            Err(error) => return queue.problems.solved(index, problem, Err(error.into())),
+        };
         let task = Task { index, begin, now, iteration: 0, search: Search::default(), tried: 0 };
-        self.slots[k].advance(queue, task);
+        self.slots[k].advance(queue, task, linear);
     }
 
     /// Rolls out trials of all problems, and ends the line searches that accept a trial or have no more step lengths.
-    fn search(&mut self, queue: &Queue<'_>) {
-        let Self { slots, trials, .. } = self;
+    fn search<P: ManyProblems>(&mut self, queue: &Queue<'_, P>) {
+        let Self { slots, trials, linear, .. } = self;
         let most = queue.settings.step_lengths;
         // one trial for each problem, and then the next step lengths of the problems whose first trial was rejected
         let mut counts: Vec<usize> = slots.iter().map(|slot| usize::from(slot.task.is_some())).collect();
@@ -321,11 +345,11 @@ impl Worker {
         let horizon = slots[0].problem.horizon();
         for (slot, &count) in slots.iter_mut().zip(&counts) {
             let Some(task) = &slot.task else { continue };
-            let SolverLoop { iterate, sweep, line_search, .. } = &slot.solver;
+            let SolverLoop { iterate, line_search, .. } = &slot.solver;
             let counts_gaps = queue.settings.counts_gaps(task.now.merit.feasible);
             of.extend((0..count).map(|_| problems.len()));
             steps.extend_from_slice(&line_search.steps()[task.tried..task.tried + count]);
-            problems.push((slot.problem.action_view(), Nominal::of(iterate, sweep.feedback(), counts_gaps)));
+            problems.push((slot.problem.action_view(), Nominal::stored(iterate, counts_gaps)));
         }
         trials.run(&mut SeveralProblems { problems, of }, &steps, 0..=horizon);
         let mut first = 0;
@@ -358,8 +382,8 @@ impl Worker {
             );
             task.iteration += 1;
             match stop {
-                Some(status) => slot.end(queue, task, status),
-                None => slot.advance(queue, task),
+                Some(status) => slot.end(queue, task, status, linear),
+                None => slot.advance(queue, task, linear),
             }
         }
     }
@@ -368,31 +392,40 @@ impl Worker {
 impl Slot {
     /// Begins the next iteration of a problem: derivatives, sweep, and the expected decrease of its line search. Ends
     /// the solve if there is a reason to stop.
-    fn advance(&mut self, queue: &Queue<'_>, mut task: Task) {
+    fn advance<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, mut task: Task, linear: &mut Linear) {
         let Self { problem, solver, .. } = self;
-        let settings = queue.settings;
+        let (settings, Linear { knots, sweep }) = (queue.settings, &mut *linear);
         if !task.now.is_finite() && task.iteration == 0 {
-            return self.end(queue, task, Status::NotFinite);
+            return self.end(queue, task, Status::NotFinite, linear);
         }
         if task.iteration == Pass::default().most(settings) {
-            return self.end(queue, task, Status::MaxIterations);
+            return self.end(queue, task, Status::MaxIterations, linear);
         }
-        let steps = [task.iteration == 0, task.search.accepted];
-        let watch = &mut Unobserved;
-        let found = solver.begin_iteration(problem, settings, &mut task.now, steps, None, &mut Watch::new(watch));
+        // the derivatives are always computed, because other problems have used their storage
+        let steps = [true, task.search.accepted];
+        solver.exchange(knots, sweep, task.iteration > 0);
+        let mut observer = Unobserved;
+        let watch = &mut Watch::new(&mut observer);
+        let found = solver.begin_iteration(problem, settings, &mut task.now, steps, None, watch);
+        if found.is_ok() {
+            let (line_search, around, _) = solver.surroundings(settings, &task.now);
+            task.search = line_search.begin(&around, task.search);
+            solver.store_gains(&mut task.now);
+        }
+        solver.exchange(knots, sweep, false);
         if let Err(status) = found {
-            return self.end(queue, task, status);
+            return self.end(queue, task, status, linear);
         }
-        let (line_search, around, _) = solver.surroundings(settings, &task.now);
-        task.search = line_search.begin(&around, task.search);
         task.tried = 0;
         self.task = Some(task);
     }
 
     /// Completes a solution and passes it on.
-    fn end(&mut self, queue: &Queue<'_>, task: Task, status: Status) {
+    fn end<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, task: Task, status: Status, linear: &mut Linear) {
         let Self { problem, solver, .. } = self;
+        solver.exchange(&mut linear.knots, &mut linear.sweep, task.iteration > 0);
         solver.finish(problem, queue.settings, task.now, status);
+        solver.exchange(&mut linear.knots, &mut linear.sweep, false);
         let solution = &mut solver.iterate.solution;
         solution.timings.end(task.begin.elapsed(), None);
         queue.problems.solved(task.index, problem, Ok(solution));

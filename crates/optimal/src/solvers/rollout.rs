@@ -1,11 +1,14 @@
 //! Rollouts of several trials in one group: several step lengths of one problem, or trials of several problems.
 
+#![allow(non_snake_case)] // names follow the literature: K, k
+
 use super::iterate::{Iterate, Sum};
 use super::solution::Solution;
 use crate::lq::{DIVERGED, KnotFeedback};
 use crate::problem::{ActionModel, ActionView, Evaluation, Problem, Results, Shape, evaluate, evaluate_across};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
+use nalgebra::{DMatrix, DVector};
 
 /// Trial trajectories that are rolled out together, each with a step length. At each knot, one group call evaluates all
 /// trials. The trials are stored knot after knot and, within a knot, trial after trial.
@@ -40,14 +43,36 @@ pub(super) struct Nominal<'a> {
     pub(super) us: &'a [f64],
     /// Gaps f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
     pub(super) gaps: Option<&'a [f64]>,
-    pub(super) feedback: &'a [KnotFeedback],
+    pub(super) gains: NominalGains<'a>,
+}
+
+/// Gains K and k of the feedback, in the results of a sweep or in a solution.
+#[derive(Clone, Copy)]
+pub(super) enum NominalGains<'a> {
+    Swept(&'a [KnotFeedback]),
+    Stored(&'a [DMatrix<f64>], &'a [DVector<f64>]),
+}
+
+impl<'a> NominalGains<'a> {
+    /// Returns K and k of knot t, column after column; empty at the terminal knot.
+    fn at(self, t: usize) -> [&'a [f64]; 2] {
+        match self {
+            Self::Swept(feedback) => [feedback[t].K.as_slice(), feedback[t].k.as_slice()],
+            Self::Stored(K, k) => [K.get(t).map_or(&[], |K| K.as_slice()), k.get(t).map_or(&[], |k| k.as_slice())],
+        }
+    }
 }
 
 impl<'a> Nominal<'a> {
     /// Returns the trajectory of an iterate with its feedback, and with its gaps if `counts_gaps`.
     pub(super) fn of(iterate: &'a Iterate, feedback: &'a [KnotFeedback], counts_gaps: bool) -> Self {
-        let Iterate { solution: Solution { xs, us, .. }, gaps, .. } = iterate;
-        Self { xs, us, gaps: counts_gaps.then_some(&gaps[..]), feedback }
+        Self { gains: NominalGains::Swept(feedback), ..Self::stored(iterate, counts_gaps) }
+    }
+
+    /// Returns the trajectory as [`of`](Self::of) does, with the gains that are stored in the solution.
+    pub(super) fn stored(iterate: &'a Iterate, counts_gaps: bool) -> Self {
+        let Iterate { solution: Solution { xs, us, K, k, .. }, gaps, .. } = iterate;
+        Self { xs, us, gaps: counts_gaps.then_some(&gaps[..]), gains: NominalGains::Stored(K, k) }
     }
 }
 
@@ -154,12 +179,7 @@ impl Trials {
     ///
     /// with uₜ moved into its bounds. The range of `knots` begins at the first knot, or continues where the last call
     /// ended.
-    pub(super) fn run(
-        &mut self,
-        problems: &mut impl TrialProblems,
-        steps: &[f64],
-        knots: RangeInclusive<usize>,
-    ) {
+    pub(super) fn run(&mut self, problems: &mut impl TrialProblems, steps: &[f64], knots: RangeInclusive<usize>) {
         let Self { shape, xs, us, next, motions, costs, failed, knot_costs, knot, dx, unread, .. } = self;
         let size = self.motion_size;
         let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
@@ -194,9 +214,9 @@ impl Trials {
                     _ => x.copy_from_slice(predicted),
                 }
                 action.difference(x_nominal, x, dx);
-                let gains = &nominal.feedback[t];
-                add_scaled_product(u, step, View::new(gains.k.as_slice(), nu), &[1.0]); // u += α k + K δx
-                add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
+                let [K, k] = nominal.gains.at(t);
+                add_scaled_product(u, step, View::new(k, nu), &[1.0]); // u += α k + K δx
+                add_scaled_product(u, 1.0, View::new(K, nu), dx);
                 if let Some((lower, upper)) = action.bounds(t) {
                     for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
                         *u = if *u < *lower { *lower } else { *u }; // unlike `max`, this keeps a NaN

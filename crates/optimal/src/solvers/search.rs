@@ -199,8 +199,8 @@ impl LineSearch {
         &self.steps
     }
 
-    /// Judges trial i of `trials`, which has step length number n of this search. An accepted trial becomes the iterate.
-    /// Returns whether it was accepted.
+    /// Judges trial i of `trials`, which has step length number n of this search. An accepted trial becomes the
+    /// iterate. Returns whether it was accepted.
     pub(super) fn judge(
         &self,
         around: Surroundings<'_>,

@@ -93,13 +93,23 @@ pub(super) struct Progress {
 impl SolverLoop {
     /// Allocates the workspace for problems with the dimensions of `problem`.
     pub(super) fn new(problem: &Problem) -> Self {
-        Self::with_trials(problem, problem.lanes())
+        Self::with(problem, Self::knots_of(problem), problem.lanes())
     }
 
-    /// Allocates the workspace, with storage for `width` trials in the line search.
-    pub(super) fn with_trials(problem: &Problem, width: usize) -> Self {
+    /// Allocates a workspace without storage for derivatives and sweeps, and with storage for one trial.
+    pub(super) fn for_batch(problem: &Problem) -> Self {
+        Self::with(problem, vec![LqKnot::zeros(problem.ndx(), 0)], 1)
+    }
+
+    /// Allocates the LQ knots of `problem`.
+    pub(super) fn knots_of(problem: &Problem) -> Vec<LqKnot> {
         let mut knots = problem.lq_knots();
         problem.reserve_inverse_dynamics(&mut knots);
+        knots
+    }
+
+    /// Allocates the workspace, with the given LQ knots and storage for `width` trials.
+    fn with(problem: &Problem, knots: Vec<LqKnot>, width: usize) -> Self {
         Self {
             iterate: Iterate::new(problem),
             sweep: Sweep::new(&knots),
@@ -225,7 +235,8 @@ impl SolverLoop {
         let mut search = Search::default();
         for iteration in 0..pass.most(settings) {
             let known = direction.take();
-            if let Err(status) = self.begin_iteration(problem, settings, now, [iteration == 0, search.accepted], known, watch)
+            if let Err(status) =
+                self.begin_iteration(problem, settings, now, [iteration == 0, search.accepted], known, watch)
             {
                 return status;
             }
@@ -485,12 +496,28 @@ impl SolverLoop {
         solution.feasible = now.merit.feasible;
         solution.regularisation = regularisation;
         solution.status = status;
-        if !now.swept {
-            return; // keep the gains of the previous solve, shifted or not
+        if now.swept {
+            self.store_gains(&mut now); // else, the gains of the previous solve stay, shifted or not
         }
+    }
+
+    /// Copies the gains of the last sweep to the solution.
+    pub(super) fn store_gains(&mut self, now: &mut Progress) {
+        let solution = &mut self.iterate.solution;
         for ((K, k), feedback) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.feedback()) {
             K.copy_from(&feedback.K);
             k.copy_from(&feedback.k);
+        }
+        now.swept = false;
+    }
+
+    /// Exchanges the linear-quadratic problem and the sweep of this loop for `knots` and `sweep`. The next sweep starts
+    /// from the feed-forward in the solution, if this loop has `swept` before.
+    pub(super) fn exchange(&mut self, knots: &mut Vec<LqKnot>, sweep: &mut Sweep, swept: bool) {
+        std::mem::swap(&mut self.knots, knots);
+        std::mem::swap(&mut self.sweep, sweep);
+        if swept {
+            self.sweep.start_from(&self.iterate.solution.k);
         }
     }
 }
