@@ -1,4 +1,4 @@
-"""Solves many variations of a problem: in this process, or on the machines of a Ray cluster."""
+"""Solves many variations of a problem: in SIMD lanes, in this process or on the machines of a Ray cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._condyle import LEVEL, AugmentedLagrangian, Error, Fddp, InteriorPoint, Problem, __version__
+from ._condyle import LEVEL, AugmentedLagrangian, Error, Fddp, InteriorPoint, Problem, __version__, _solve_many
 from ._report import counter
 from ._types import Solution
 
@@ -18,13 +18,15 @@ _Rows = dict[str, NDArray[Any]]
 
 
 class Variations(NamedTuple):
-    """The results of a `sweep`: row i belongs to variation i.
+    """The results of `sweep` or `solve_many`: row i belongs to variation i.
 
     If a variation fails with an error, its numbers are NaN and its status is "error".
     """
 
     status: NDArray[np.str_]
-    """The final status of each solve, as in `Solution.status`; "error" if the variation failed with an `error`."""
+    """The final status of each solve, as in `Solution.status`; "error" if the variation failed with an `error`;
+    "not_started" if the time budget of `solve_many` was over.
+    """
     cost: _Array
     """The cost of each trajectory."""
     gap: _Array
@@ -32,7 +34,9 @@ class Variations(NamedTuple):
     iterations: NDArray[np.int64]
     """The number of iterations of each solve."""
     seconds: _Array
-    """The duration of each solve (s)."""
+    """The duration of each solve (s), from its start to its end. Variations that share SIMD lanes are solved at the
+    same time, so the sum of these durations exceeds the duration of the call.
+    """
     error: NDArray[np.str_]
     """The error message if a variation could not be made or solved; else empty."""
     xs: _Array | None
@@ -89,6 +93,9 @@ def sweep(
 ) -> Variations:
     """Solves variations of a problem, for example for a library of motions, a sweep of parameters, or Monte Carlo
     trials of a plan.
+
+    With `Fddp`, variations that differ only in initial states, targets, weights, bounds and durations are solved
+    together in SIMD lanes, as in `solve_many`. All other variations are solved one by one.
 
     problem: the nominal problem.
     variations: V initial states, (V, nx); or, with `vary`, a sequence of V objects of any type.
@@ -156,6 +163,106 @@ def sweep(
     return _table([results[number] for number in range(len(chunks))])
 
 
+def solve_many(
+    problem: Problem,
+    x0: ArrayLike | None = None,
+    *,
+    references: dict[str, ArrayLike] | None = None,
+    weights: dict[str, ArrayLike] | None = None,
+    start: Solution | tuple[Any, Any] | None = None,
+    settings: dict[str, Any] | None = None,
+    keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
+    threads: int = 1,
+    progress: bool | Callable[[int, int], object] = False,
+) -> Variations:
+    """Solves many problems of one shape by `Fddp`, several at a time in SIMD lanes.
+
+    Each problem has its own step lengths, regularisation and convergence. The result of a problem does not depend on
+    the other problems, to the bit. It may differ by rounding from the result of `Fddp` alone.
+
+    problem: the nominal problem. It is copied, and not changed.
+    x0: the initial states, (V, nx); or one initial state for all problems, nx numbers; None takes the problem's.
+    references: for names of costs, the targets of each problem, (V, N + 1, n), with rows as in
+        `Problem.set_references`; or (V, n), one target for all knots of a problem.
+    weights: for names of costs, the weights of each problem, (V, N + 1), or (V,), one weight for all knots.
+    start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
+        and starts from its solution. The first state is replaced by the initial state of each problem.
+    settings: the settings of `Fddp`. Its `time_budget` limits the whole call: problems that are being solved then end
+        with the status "time_limit", and the others with "not_started".
+    keep: the arrays of each solution to keep.
+    threads: the number of threads, each of which solves its own problems.
+    progress: as in `sweep`.
+
+    Returns `Variations`. The error of a problem is stored in its row, and does not affect the others. For more problems
+    than fit into memory, and for variations that change the model or the contacts, use `condyle.sweep`.
+
+    Raises ValueError for invalid arguments, and `ProblemError` for an `Action` in Python, which cannot be copied.
+
+    >>> arm, rest = condyle.robots.arm7(), np.zeros(14)
+    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual, solve_many
+    >>> costs = [Cost("rest", 1.0, Residual.state(rest)), Cost("effort", 1e-3, Residual.control_gravity())]
+    >>> problem = Problem(rest, [FreeDynamics(arm, 0.02, costs)], [0] * 20, FreeDynamics(arm, None, costs[:1]))
+    >>> goals = np.random.default_rng(1).normal(rest, 0.05, (100, 14))
+    >>> found = solve_many(problem, references={"rest": goals}, keep=["us", "K"])
+    >>> set(found.status.tolist()), found.us.shape, found.K.shape
+    ({'converged'}, (100, 20, 7), (100, 20, 7, 14))
+    """
+    if not set(keep) <= {"xs", "us", "K", "k"}:
+        raise ValueError(f"keep: expected some of 'xs', 'us', 'K' and 'k', found {list(keep)!r}")
+    if threads < 1:
+        raise ValueError(f"threads: expected at least 1, found {threads}")
+    rows = problem.horizon + 1
+    targets = [
+        (name, _by_knot("references", name, values, rows, problem.references(name)[0].shape))
+        for name, values in (references or {}).items()
+    ]
+    scales = [(name, _by_knot("weights", name, values, rows, ())) for name, values in (weights or {}).items()]
+    states = None if x0 is None else np.asarray(x0, float)
+    counts = {name: len(values) for name, values in targets + scales}
+    if states is not None and states.ndim != 1:
+        counts["x0"] = len(_states(problem, states, "x0"))
+    if not counts:
+        raise ValueError("x0: expected the states of several problems, (V, nx), if there are no references and weights")
+    count = next(iter(counts.values()))
+    if set(counts.values()) != {count}:
+        raise ValueError(f"expected one number of problems, found {', '.join(f'{k}: {v}' for k, v in counts.items())}")
+    data: dict[str, Any] = {"references": targets, "weights": scales}
+    if states is not None:
+        data["x0"] = np.ascontiguousarray(np.broadcast_to(states, (count, problem.nx)))
+    options = settings or {}
+    nominal = {name: value for name, value in options.items() if name != "time_budget"}
+    job = Job(problem, _start(problem, start, Fddp, nominal), None, Fddp, options, tuple(keep))
+    report = counter(progress, count, 0)
+    told = [0]
+
+    def tell(ended: int) -> None:
+        report(ended - told[0])
+        told[0] = ended
+
+    try:
+        solver = Fddp(problem, **options)
+        watcher = tell if progress else None
+        found, wrong = _solve_many(solver, count, data, job.start, None, list(keep), threads, watcher)
+        if progress:
+            tell(count)
+    finally:
+        report(None)
+    table = _table([_columns(job, found, wrong)])
+    return table._replace(status=np.where(table.status == "", "not_started", table.status))
+
+
+def _by_knot(argument: str, name: str, values: ArrayLike, rows: int, shape: tuple[int, ...]) -> _Array:
+    """Returns the numbers of all knots of each problem in a row, from numbers for each knot or for all knots."""
+    found = np.asarray(values, float)
+    if found.shape[1:] == shape and found.ndim > 0:
+        found = np.repeat(found[:, None], rows, axis=1)
+    if found.ndim != 2 + len(shape) or found.shape[1:] != (rows, *shape):
+        of_all, of_each = str(("V", *shape)), str(("V", rows, *shape))
+        wanted = f"{of_all} or {of_each}".replace("'", "")
+        raise ValueError(f"{argument}: expected {wanted} numbers of '{name}', found the shape {found.shape}")
+    return found.reshape(len(found), rows * int(np.prod(shape)))
+
+
 def _solved(
     job: Job, missing: list[tuple[int, int, Any]], cluster: bool | str | None, workers: int | None
 ) -> Iterator[tuple[int, _Rows]]:
@@ -178,9 +285,15 @@ class Worker:
     def __init__(self, job: Job) -> None:
         self._job = job
         self._same = None if job.vary else job.solver(job.problem, **job.settings)
+        self._together = job.solver is Fddp and not {"time_budget", "segments"} & job.settings.keys()
 
     def solve(self, first: int, items: Any) -> _Rows:
         """Returns the rows of the results for the variations `items`; `first` is the index of the first variation."""
+        if self._together:
+            try:
+                return self._in_lanes(first, items)
+            except (Error, ArithmeticError, LookupError, TypeError, ValueError):
+                self._together = False  # for example an action in Python, which cannot be copied
         found: list[Solution | str] = []
         for number, item in enumerate(items, first):
             try:
@@ -188,6 +301,14 @@ class Worker:
             except (Error, ArithmeticError, LookupError, TypeError, ValueError) as wrong:
                 found.append(f"variation {number}: {type(wrong).__name__}: {wrong}")
         return _rows(found, self._job)
+
+    def _in_lanes(self, first: int, items: Any) -> _Rows:
+        job = self._job
+        solver = self._same or Fddp(job.problem, **job.settings)
+        vary = (job.vary, list(items)) if job.vary else None
+        data = {} if job.vary else {"x0": np.ascontiguousarray(items, float)}
+        found, wrong = _solve_many(solver, len(items), data, job.start, vary, list(job.keep), 1, None)
+        return _columns(job, found, wrong, first)
 
     def _one(self, item: Any) -> Solution:
         job = self._job
@@ -203,10 +324,10 @@ class Worker:
         return job.solver(problem, **job.settings).solve(xs, us)
 
 
-def _states(problem: Problem, variations: ArrayLike) -> _Array:
+def _states(problem: Problem, variations: ArrayLike, argument: str = "variations") -> _Array:
     states = np.array(variations, float)
     if states.ndim != 2 or states.shape[1] != problem.nx:
-        raise ValueError(f"variations: expected states, (V, {problem.nx}), found the shape {states.shape}")
+        raise ValueError(f"{argument}: expected states, (V, {problem.nx}), found the shape {states.shape}")
     return states
 
 
@@ -234,22 +355,17 @@ def _flat(x: Any) -> _Array:
     return np.concatenate([np.ravel(part) for part in x]) if isinstance(x, list) else np.asarray(x, float)
 
 
-def _shapes(job: Job) -> dict[str, tuple[int, ...]]:
-    """Returns the shapes of the arrays of a solution that are kept, computed from the start and the problem."""
-    us = _flat(job.start[1])
-    n, ndx = job.problem.horizon, job.problem.ndx
-    wide = us.ndim == 2
-    return {
-        "xs": (n + 1, job.problem.nx),
-        "us": us.shape,
-        "k": us.shape,
-        "K": (*us.shape, ndx) if wide else (us.size * ndx,),
-    }
+def _shapes(problem: Problem, controls: Any) -> dict[str, tuple[int, ...]]:
+    """Returns the shapes of the arrays of a solution, computed from the problem and the controls of a start."""
+    us = _flat(controls)
+    n, ndx = problem.horizon, problem.ndx
+    K = (*us.shape, ndx) if us.ndim == 2 else (us.size * ndx,)
+    return {"xs": (n + 1, problem.nx), "us": us.shape, "k": us.shape, "K": K}
 
 
 def _rows(found: list[Solution | str], job: Job) -> _Rows:
     """Converts the solutions, or error messages, of variations to the columns of `Variations`."""
-    shapes = _shapes(job)
+    shapes = _shapes(job.problem, job.start[1])
     solved = [None if isinstance(one, str) else one for one in found]
     rows: _Rows = {
         "status": np.array(["error" if one is None else one.status for one in solved]),
@@ -265,6 +381,20 @@ def _rows(found: list[Solution | str], job: Job) -> _Rows:
             if one is not None:
                 row[...] = _flat(getattr(one, name)).reshape(row.shape)
     return rows
+
+
+def _columns(job: Job, found: _Rows, wrong: list[tuple[int, BaseException]], first: int = 0) -> _Rows:
+    """Converts the results of `_solve_many` to the columns of `Variations`; `first` is the index of the first row."""
+    messages = dict(wrong)
+    rows = {name: np.asarray(found[name]) for name in ("status", "cost", "gap", "iterations", "seconds")}
+    rows["error"] = np.array(
+        [
+            f"variation {first + i}: {type(messages[i]).__name__}: {messages[i]}" if i in messages else ""
+            for i in range(len(rows["cost"]))
+        ]
+    )
+    shapes = _shapes(job.problem, job.start[1])
+    return rows | {name: found[name].reshape(-1, *shapes[name]) for name in shapes if name in found}
 
 
 def _table(parts: list[_Rows]) -> Variations:

@@ -60,6 +60,7 @@ from ._condyle import (
     WrenchCone,
     rollout_many,
 )
+from ._sweep import solve_many
 from ._types import (
     BoundGradients,
     ConstraintRows,
@@ -125,5 +126,6 @@ __all__ = [
     "WrenchCone",
     "ode_action",
     "rollout_many",
+    "solve_many",
     "thrusters",
 ]

@@ -132,7 +132,7 @@ mod _condyle {
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,
         ControlRate, Cost, DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics,
         InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivity, Sweep, Unicycle,
-        WrenchCone, rollout_many,
+        WrenchCone, rollout_many, solve_variations,
     };
     #[pymodule_export]
     use regressors::{

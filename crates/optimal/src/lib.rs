@@ -106,9 +106,9 @@ pub use sensitivity::{
     SolutionJacobian, WeakestBound,
 };
 pub use solvers::{
-    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,
-    Iteration, LimitRows, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution,
-    StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
+    AugmentedLagrangian, BatchFddp, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint,
+    InteriorPointSettings, Iteration, LimitRows, ManyProblems, Observer, Outcome, PlanPoint, Policy, PolicyPoint,
+    PolicyPublisher, Settings, Solution, StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

@@ -9,6 +9,7 @@ use super::segments::Segments;
 use super::step::{Step, SweepError, SweepOptions, SweepOutput};
 use crate::error::assert_length;
 use condyle_dynamics::level::level;
+use nalgebra::DVector;
 
 /// Backward Riccati sweep, with its workspace.
 ///
@@ -131,6 +132,13 @@ impl Sweep {
     pub(crate) fn forget(&mut self) {
         for feedback in &mut self.feedback {
             feedback.k.fill(0.0);
+        }
+    }
+
+    /// Sets the feed-forward terms from which the Newton steps of the next run start, with the opposite sign.
+    pub(crate) fn start_from(&mut self, k: &[DVector<f64>]) {
+        for (feedback, k) in self.feedback.iter_mut().zip(k) {
+            feedback.k.copy_from(k);
         }
     }
 

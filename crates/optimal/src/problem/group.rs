@@ -138,6 +138,29 @@ pub trait KnotGroup {
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>);
 
+    /// Computes values at knot t of several problems, in one batch. Lane i has the i-th state of `xs` and the i-th
+    /// control of `us`. It belongs to this action if `of[i]` is 0, and else to action `of[i]` − 1 of `others`. All of
+    /// them [match](Self::matches) this action. Returns false if the knot is not computed in batches.
+    #[track_caller]
+    fn evaluate_across(
+        &mut self,
+        others: &mut [&mut dyn ActionModel],
+        of: &[usize],
+        t: usize,
+        trajectory: [&[f64]; 2],
+        results: &mut Results<'_>,
+    ) -> bool {
+        let _ = (others, of, t, trajectory, results);
+        false
+    }
+
+    /// Returns whether knot t of this action and of `other` differ only in numbers that may differ between the lanes of
+    /// one batch: durations, weights, targets and bounds.
+    fn matches(&self, other: &dyn ActionModel, t: usize) -> bool {
+        let _ = (other, t);
+        false
+    }
+
     /// Calls `visit` for the constraints of knot t, in their order.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>);
 
@@ -251,6 +274,33 @@ pub(crate) fn evaluate(
         (Some(group), _) => group.calc_diff_group(knots, xs, us, lq_knots),
         (None, Evaluation::Values) => calc_each(action, knots, [xs, us], next, costs),
         (None, _) => calc_diff_each(action, knots, [xs, us], lq_knots),
+    }
+}
+
+/// Computes values at knot t of several problems. Trial i has the i-th state of `xs` and the i-th control of `us`, and
+/// belongs to action `of[i]`. Actions that are not computed in batches are evaluated one by one.
+#[track_caller]
+pub(crate) fn evaluate_across(
+    actions: &mut [&mut dyn ActionModel],
+    of: &[usize],
+    t: usize,
+    xs: &[f64],
+    us: &[f64],
+    results: &mut Results<'_>,
+) {
+    let [first, others @ ..] = &mut *actions else { return };
+    if let Some(group) = first.knot_group_mut()
+        && group.evaluate_across(others, of, t, [xs, us], results)
+    {
+        return;
+    }
+    let count = of.len();
+    let (nx, nu, motion) = (xs.len() / count, us.len() / count, results.motions.len() / count);
+    for (i, &k) in of.iter().enumerate() {
+        let next = &mut results.next[i * nx..][..nx];
+        let motions = &mut results.motions[i * motion..][..motion];
+        let mut own = Results::values(next, &mut results.costs[i..=i], motions);
+        evaluate(&mut *actions[k], &[t], &xs[i * nx..][..nx], &us[i * nu..][..nu], Evaluation::Values, &mut own);
     }
 }
 

@@ -26,7 +26,7 @@ pub use autodiff::{AutoDiff, GenericAction};
 pub use constrained::Constrained;
 pub use control_rate::ControlRate;
 pub use group::GroupModel;
-pub(crate) use group::{Evaluation, KnotGroup, Results, evaluate, innermost};
+pub(crate) use group::{Evaluation, KnotGroup, Results, evaluate, evaluate_across, innermost};
 pub use horizon::Problem;
 pub use lqr::Lqr;
 pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a_value, outside};

@@ -167,17 +167,18 @@ impl Models {
         Some(action)
     }
 
-    /// Copies all actions; each copy represents the same models.
+    /// Copies all actions; each copy represents the same models. The copies share scratch memory with `beside`, an
+    /// action that the same thread uses, or else with each other.
     ///
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
-    pub(crate) fn try_clone(&self) -> Result<Self, Error> {
+    pub(crate) fn try_clone(&self, beside: Option<&dyn ActionModel>) -> Result<Self, Error> {
         let model = |k: usize| self.places.of.iter().position(|place| place[0] == k);
         let mut actions: Vec<Box<dyn ActionModel>> = Vec::with_capacity(self.actions.len());
         for (k, action) in self.actions.iter().enumerate() {
             let mut copy = action.try_clone().ok_or(Error::NoCopy { model: model(k) })?;
-            if let Some(first) = actions.first() {
-                share(&**first, &mut *copy);
+            if let Some(first) = beside.or(actions.first().map(|first| &**first)) {
+                share(first, &mut *copy);
             }
             reserve(&mut *copy);
             actions.push(copy);

@@ -1,6 +1,7 @@
 //! Solvers. All of them share one loop of derivatives, sweeps and line searches.
 
 mod augmented_lagrangian;
+mod batch;
 mod best;
 mod fddp;
 mod interior_point;
@@ -22,6 +23,7 @@ mod start;
 mod watch;
 
 pub use augmented_lagrangian::AugmentedLagrangian;
+pub use batch::{BatchFddp, ManyProblems};
 pub use fddp::Fddp;
 pub use interior_point::{InteriorPoint, InteriorPointSettings};
 pub use limit_rows::LimitRows;

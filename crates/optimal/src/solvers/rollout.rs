@@ -1,13 +1,16 @@
-//! Rollouts of several step lengths in one group.
+//! Rollouts of several trials in one group: several step lengths of one problem, or trials of several problems.
+
+#![allow(non_snake_case)] // names follow the literature: K, k
 
 use super::iterate::{Iterate, Sum};
 use super::solution::Solution;
 use crate::lq::{DIVERGED, KnotFeedback};
-use crate::problem::{ActionView, Evaluation, Problem, Results, Shape, evaluate};
+use crate::problem::{ActionModel, ActionView, Evaluation, Problem, Results, Shape, evaluate, evaluate_across};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
+use nalgebra::{DMatrix, DVector};
 
-/// Trial trajectories, one per step length, that are rolled out together. At each knot, one group call evaluates all
+/// Trial trajectories that are rolled out together, each with a step length. At each knot, one group call evaluates all
 /// trials. The trials are stored knot after knot and, within a knot, trial after trial.
 #[derive(Debug, Clone)]
 pub(super) struct Trials {
@@ -40,7 +43,94 @@ pub(super) struct Nominal<'a> {
     pub(super) us: &'a [f64],
     /// Gaps f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
     pub(super) gaps: Option<&'a [f64]>,
-    pub(super) feedback: &'a [KnotFeedback],
+    pub(super) gains: NominalGains<'a>,
+}
+
+/// Gains K and k of the feedback, in the results of a sweep or in a solution.
+#[derive(Clone, Copy)]
+pub(super) enum NominalGains<'a> {
+    Swept(&'a [KnotFeedback]),
+    Stored(&'a [DMatrix<f64>], &'a [DVector<f64>]),
+}
+
+impl<'a> NominalGains<'a> {
+    /// Returns K and k of knot t, column after column; empty at the terminal knot.
+    fn at(self, t: usize) -> [&'a [f64]; 2] {
+        match self {
+            Self::Swept(feedback) => [feedback[t].K.as_slice(), feedback[t].k.as_slice()],
+            Self::Stored(K, k) => [K.get(t).map_or(&[], |K| K.as_slice()), k.get(t).map_or(&[], |k| k.as_slice())],
+        }
+    }
+}
+
+impl<'a> Nominal<'a> {
+    /// Returns the trajectory of an iterate with its feedback, and with its gaps if `counts_gaps`.
+    pub(super) fn of(iterate: &'a Iterate, feedback: &'a [KnotFeedback], counts_gaps: bool) -> Self {
+        Self { gains: NominalGains::Swept(feedback), ..Self::stored(iterate, counts_gaps) }
+    }
+
+    /// Returns the trajectory as [`of`](Self::of) does, with the gains that are stored in the solution.
+    pub(super) fn stored(iterate: &'a Iterate, counts_gaps: bool) -> Self {
+        let Iterate { solution: Solution { xs, us, K, k, .. }, gaps, .. } = iterate;
+        Self { xs, us, gaps: counts_gaps.then_some(&gaps[..]), gains: NominalGains::Stored(K, k) }
+    }
+}
+
+/// Problems to which the trials of a group belong.
+pub(super) trait TrialProblems {
+    /// Returns the trajectory from which trial `i` starts, with its feedback.
+    fn nominal(&self, i: usize) -> Nominal<'_>;
+
+    /// Returns the actions of the problem of trial `i`.
+    fn view(&self, i: usize) -> &ActionView<'_>;
+
+    /// Evaluates knot t of all trials; `knots` contains t once for each trial.
+    fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], results: &mut Results<'_>);
+}
+
+/// Problem to which all trials of a group belong. The trials start from one trajectory.
+pub(super) struct OneProblem<'a, 'v> {
+    pub(super) view: &'a mut ActionView<'v>,
+    pub(super) nominal: Nominal<'a>,
+}
+
+impl TrialProblems for OneProblem<'_, '_> {
+    fn nominal(&self, _: usize) -> Nominal<'_> {
+        self.nominal
+    }
+
+    fn view(&self, _: usize) -> &ActionView<'_> {
+        self.view
+    }
+
+    fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], results: &mut Results<'_>) {
+        evaluate(self.view.action_mut(knots[0]), knots, xs, us, Evaluation::Values, results);
+    }
+}
+
+/// Problems of one shape, to each of which some trials of a group belong.
+pub(super) struct SeveralProblems<'a> {
+    /// Actions and trajectory of each problem.
+    pub(super) problems: Vec<(ActionView<'a>, Nominal<'a>)>,
+    /// Index of each trial's problem.
+    pub(super) of: Vec<usize>,
+}
+
+impl TrialProblems for SeveralProblems<'_> {
+    fn nominal(&self, i: usize) -> Nominal<'_> {
+        self.problems[self.of[i]].1
+    }
+
+    fn view(&self, i: usize) -> &ActionView<'_> {
+        &self.problems[self.of[i]].0
+    }
+
+    fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], results: &mut Results<'_>) {
+        let t = knots[0];
+        let mut actions: Vec<&mut dyn ActionModel> =
+            self.problems.iter_mut().map(|(view, _)| view.action_mut(t)).collect();
+        evaluate_across(&mut actions, &self.of, t, xs, us, results);
+    }
 }
 
 impl Trials {
@@ -83,19 +173,13 @@ impl Trials {
         self.width
     }
 
-    /// Rolls out one trial per step length α:
+    /// Rolls out one trial per step length α. Trial i belongs to a problem of `problems`:
     ///
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
     ///
     /// with uₜ moved into its bounds. The range of `knots` begins at the first knot, or continues where the last call
     /// ended.
-    pub(super) fn run(
-        &mut self,
-        view: &mut ActionView<'_>,
-        nominal: &Nominal<'_>,
-        steps: &[f64],
-        knots: RangeInclusive<usize>,
-    ) {
+    pub(super) fn run(&mut self, problems: &mut impl TrialProblems, steps: &[f64], knots: RangeInclusive<usize>) {
         let Self { shape, xs, us, next, motions, costs, failed, knot_costs, knot, dx, unread, .. } = self;
         let size = self.motion_size;
         let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
@@ -111,6 +195,7 @@ impl Trials {
             let u_all = &mut us[shape.offsets[t] * count..][..nu * count];
             for (i, &step) in steps.iter().enumerate() {
                 let (x, u) = (&mut x_all[i * nx..][..nx], &mut u_all[i * nu..][..nu]);
+                let (nominal, view) = (problems.nominal(i), problems.view(i));
                 let (x_nominal, u_nominal) = (&nominal.xs[shape.x(t)], &nominal.us[shape.u(t)]);
                 u.copy_from_slice(u_nominal);
                 if failed[i] {
@@ -129,9 +214,9 @@ impl Trials {
                     _ => x.copy_from_slice(predicted),
                 }
                 action.difference(x_nominal, x, dx);
-                let gains = &nominal.feedback[t];
-                add_scaled_product(u, step, View::new(gains.k.as_slice(), nu), &[1.0]); // u += α k + K δx
-                add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
+                let [K, k] = nominal.gains.at(t);
+                add_scaled_product(u, step, View::new(k, nu), &[1.0]); // u += α k + K δx
+                add_scaled_product(u, 1.0, View::new(K, nu), dx);
                 if let Some((lower, upper)) = action.bounds(t) {
                     for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
                         *u = if *u < *lower { *lower } else { *u }; // unlike `max`, this keeps a NaN
@@ -141,11 +226,10 @@ impl Trials {
             }
             knot[..count].fill(t);
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
-            let action = view.action_mut(t);
             let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
             let motions = if t < horizon { &mut motions[t * size * count..][..size * count] } else { &mut [] };
             let mut results = Results::values(next_all, costs_all, motions);
-            evaluate(action, knot, x_all, u_all, Evaluation::Values, &mut results);
+            problems.evaluate(knot, x_all, u_all, &mut results);
             for i in 0..count {
                 costs[i].add(knot_costs[i]);
                 let bounded = |x: f64| x.abs() < DIVERGED; // false for NaN

@@ -3,9 +3,9 @@
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;
-use super::rollout::{Nominal, Trials};
+use super::rollout::{Nominal, OneProblem, Trials};
 use super::settings::{DdpMethod, Settings};
-use super::solution::{Solution, Status};
+use super::solution::Status;
 use super::watch::{Clock, Phase, Watch};
 use crate::lq::KnotFeedback;
 use crate::problem::{ActionView, Problem};
@@ -24,7 +24,7 @@ const SECOND: usize = 4;
 const WARY: usize = 3;
 
 /// Outcome of a line search: data of the accepted trial, or of the last trial that stayed finite if none was accepted.
-#[derive(Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Search {
     pub(super) step: f64,
     pub(super) d1: f64,
@@ -39,7 +39,7 @@ pub(super) struct Search {
 }
 
 /// Iterate with its feedback, and the fields of a solver that its line search uses.
-pub(super) struct Surroundings<'a, 'o> {
+pub(super) struct Surroundings<'a> {
     /// Iterate, which the accepted trial replaces.
     pub(super) iterate: &'a mut Iterate,
     pub(super) merit: Merit,
@@ -48,8 +48,6 @@ pub(super) struct Surroundings<'a, 'o> {
     /// Feedback and value functions of all knots.
     pub(super) feedback: &'a [KnotFeedback],
     pub(super) settings: &'a Settings,
-    pub(super) clock: &'a mut Clock,
-    pub(super) watch: &'a mut Watch<'o>,
 }
 
 /// Line search, with its workspace.
@@ -69,11 +67,11 @@ pub(super) struct LineSearch {
 }
 
 impl LineSearch {
-    /// Allocates the workspace for problems with the dimensions of `problem`.
-    pub(super) fn new(problem: &Problem) -> Self {
+    /// Allocates the workspace for problems with the dimensions of `problem`, with storage for `width` trials.
+    pub(super) fn new(problem: &Problem, width: usize) -> Self {
         let (horizon, ndx) = (problem.horizon(), problem.ndx());
         Self {
-            trials: Trials::new(problem, problem.lanes()),
+            trials: Trials::new(problem, width),
             ahead: None,
             wary: 0,
             steps: Vec::new(),
@@ -108,17 +106,18 @@ impl LineSearch {
     /// diverges, it is the expected decrease of the previous line search, `last`. In DDP the expected decrease does not
     /// depend on the trial, so a diverging trial has the same terms as any other trial of the search.
     #[inline(never)] // `benches/instructions.py` counts this function by name
-    pub(super) fn run(&mut self, problem: &mut Problem, around: Surroundings<'_, '_>, last: Search) -> Search {
-        self.expect(&around);
+    pub(super) fn run(
+        &mut self,
+        problem: &mut Problem,
+        around: Surroundings<'_>,
+        last: Search,
+        clock: &mut Clock,
+        watch: &mut Watch<'_>,
+    ) -> Search {
+        let mut search = self.begin(&around, last);
         let Self { trials, ahead, wary, steps, curved_gaps, expected } = self;
-        let Surroundings { iterate, merit, best, feedback, settings, clock, watch } = around;
-        let feasible = merit.feasible;
-        let mut search = Search { accepted: false, left_best: false, ..last };
-        if settings.method == DdpMethod::Ddp {
-            [search.d1, search.d2] = *expected;
-        }
-        let counts_gaps = settings.counts_gaps(feasible);
-        let curved_gaps = counts_gaps.then_some(&curved_gaps[..]);
+        let Surroundings { iterate, merit, best, feedback, settings } = around;
+        let counts_gaps = settings.counts_gaps(merit.feasible);
         let (horizon, lanes, count) = (problem.horizon(), trials.width(), steps.len());
         let some_from = |tried: usize| {
             let most = match tried {
@@ -137,34 +136,37 @@ impl LineSearch {
                 return search;
             }
             let start = Instant::now();
-            let Iterate { solution: Solution { xs, us, .. }, gaps, .. } = &*iterate;
-            let nominal = Nominal { xs, us, gaps: counts_gaps.then_some(&gaps[..]), feedback };
-            let rule = Rule { settings, feasible, expected: *expected, curved_gaps, xs, cost: merit.cost };
+            let nominal = Nominal::of(iterate, feedback, counts_gaps);
+            let rule = Rule::new(settings, merit, *expected, curved_gaps, nominal.xs);
             let trying = some_from(tried);
             let lengths = &steps[trying.clone()];
             match (ahead.as_mut(), problem.two()) {
                 (Some(ahead), _) if ready => {
                     std::mem::swap(trials, ahead);
-                    trials.run(&mut problem.action_view(), &nominal, lengths, horizon..=horizon);
+                    let view = &mut problem.action_view();
+                    trials.run(&mut OneProblem { view, nominal }, lengths, horizon..=horizon);
                     ready = false;
                 }
                 (Some(ahead), Some([mut own, mut copies])) if beside && tried == 0 => {
                     let (next, enough) = (&steps[some_from(1)], AtomicBool::new(false));
                     join(
                         || {
-                            trials.run(&mut own, &nominal, lengths, 0..=horizon);
+                            trials.run(&mut OneProblem { view: &mut own, nominal }, lengths, 0..=horizon);
                             let good = rule.judge(&mut search.clone(), trials, 0, lengths[0], &own).is_some();
                             enough.store(good, Ordering::Relaxed);
                         },
                         || {
                             ready = (0..horizon).all(|t| {
-                                ahead.run(&mut copies, &nominal, next, t..=t);
+                                ahead.run(&mut OneProblem { view: &mut copies, nominal }, next, t..=t);
                                 !enough.load(Ordering::Relaxed)
                             });
                         },
                     );
                 }
-                _ => trials.run(&mut problem.action_view(), &nominal, lengths, 0..=horizon),
+                _ => {
+                    let view = &mut problem.action_view();
+                    trials.run(&mut OneProblem { view, nominal }, lengths, 0..=horizon);
+                }
             }
             let view = problem.action_view();
             let good = lengths
@@ -173,10 +175,7 @@ impl LineSearch {
                 .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &view).map(|cost| (i, cost)));
             iterate.solution.timings.rollout += clock.ran(Phase::Rollout, start);
             if let Some((i, cost)) = good {
-                search.left_best = best.leave(iterate, merit);
-                trials.copy_to(i, iterate);
-                iterate.solution.cost = cost;
-                search.accepted = true;
+                search.take(trials, i, cost, (iterate, best, merit));
                 break;
             }
             tried = trying.end;
@@ -185,9 +184,42 @@ impl LineSearch {
         search
     }
 
+    /// Begins a search: computes the expected decrease of the cost.
+    pub(super) fn begin(&mut self, around: &Surroundings<'_>, last: Search) -> Search {
+        self.expect(around);
+        let mut search = Search { accepted: false, left_best: false, ..last };
+        if around.settings.method == DdpMethod::Ddp {
+            [search.d1, search.d2] = self.expected;
+        }
+        search
+    }
+
+    /// Returns the step lengths of a search, 1, ½, ¼, ….
+    pub(super) fn steps(&self) -> &[f64] {
+        &self.steps
+    }
+
+    /// Judges trial i of `trials`, which has step length number n of this search. An accepted trial becomes the
+    /// iterate. Returns whether it was accepted.
+    pub(super) fn judge(
+        &self,
+        around: Surroundings<'_>,
+        search: &mut Search,
+        (trials, i, n): (&mut Trials, usize, usize),
+        view: &ActionView<'_>,
+    ) -> bool {
+        let Surroundings { iterate, merit, best, settings, .. } = around;
+        let rule = Rule::new(settings, merit, self.expected, &self.curved_gaps, &iterate.solution.xs);
+        let good = rule.judge(search, trials, i, self.steps[n], view);
+        if let Some(cost) = good {
+            search.take(trials, i, cost, (iterate, best, merit));
+        }
+        good.is_some()
+    }
+
     /// Computes the terms dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf and dq = −Σ kᵀQuu k + Σ fᵀVxx f of the expected decrease. DDP
     /// omits the terms with gaps f.
-    fn expect(&mut self, around: &Surroundings<'_, '_>) {
+    fn expect(&mut self, around: &Surroundings<'_>) {
         let Surroundings { iterate, merit, feedback, settings, .. } = around;
         let ((mut dg, mut dq), counts_gaps) = ((0.0, 0.0), settings.counts_gaps(merit.feasible));
         for (t, feedback) in feedback.iter().enumerate() {
@@ -220,7 +252,19 @@ struct Rule<'a> {
     cost: f64,
 }
 
-impl Rule<'_> {
+impl<'a> Rule<'a> {
+    /// Creates the rule for an iterate with the states `xs`.
+    fn new(
+        settings: &'a Settings,
+        Merit { feasible, cost, .. }: Merit,
+        expected: [f64; 2],
+        curved_gaps: &'a [f64],
+        xs: &'a [f64],
+    ) -> Self {
+        let curved_gaps = settings.counts_gaps(feasible).then_some(curved_gaps);
+        Self { settings, feasible, expected, curved_gaps, xs, cost }
+    }
+
     /// Writes the expected and the actual decrease of trial i, with step length α, to `search`. Returns the trial's
     /// cost if the trial is accepted.
     ///
@@ -247,6 +291,14 @@ impl Rule<'_> {
 }
 
 impl Search {
+    /// Accepts trial i: the trial replaces the iterate, and the old iterate is stored if it is the best one.
+    fn take(&mut self, trials: &Trials, i: usize, cost: f64, (iterate, best, merit): (&mut Iterate, &mut Best, Merit)) {
+        self.left_best = best.leave(iterate, merit);
+        trials.copy_to(i, iterate);
+        iterate.solution.cost = cost;
+        self.accepted = true;
+    }
+
     /// Returns whether the step is accepted: whether it lowers the cost enough. While gaps exist, FDDP also accepts a
     /// step that raises the cost by little. DDP then accepts each step with an expected decrease: the first accepted
     /// step closes all gaps, whatever it costs.

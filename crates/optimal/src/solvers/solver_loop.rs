@@ -71,7 +71,7 @@ pub(super) struct Pass {
 
 impl Pass {
     /// Returns the maximum number of iterations.
-    fn most(self, settings: &Settings) -> usize {
+    pub(super) fn most(self, settings: &Settings) -> usize {
         self.to_full_step.unwrap_or(settings.max_iterations)
     }
 }
@@ -93,13 +93,28 @@ pub(super) struct Progress {
 impl SolverLoop {
     /// Allocates the workspace for problems with the dimensions of `problem`.
     pub(super) fn new(problem: &Problem) -> Self {
+        Self::with(problem, Self::knots_of(problem), problem.lanes())
+    }
+
+    /// Allocates a workspace without storage for derivatives and sweeps, and with storage for one trial.
+    pub(super) fn for_batch(problem: &Problem) -> Self {
+        Self::with(problem, vec![LqKnot::zeros(problem.ndx(), 0)], 1)
+    }
+
+    /// Allocates the LQ knots of `problem`.
+    pub(super) fn knots_of(problem: &Problem) -> Vec<LqKnot> {
         let mut knots = problem.lq_knots();
         problem.reserve_inverse_dynamics(&mut knots);
+        knots
+    }
+
+    /// Allocates the workspace, with the given LQ knots and storage for `width` trials.
+    fn with(problem: &Problem, knots: Vec<LqKnot>, width: usize) -> Self {
         Self {
             iterate: Iterate::new(problem),
             sweep: Sweep::new(&knots),
             knots,
-            line_search: LineSearch::new(problem),
+            line_search: LineSearch::new(problem, width),
             best: Best::new(problem),
             clock: Clock::default(),
             inverse_dynamics: false,
@@ -214,63 +229,117 @@ impl SolverLoop {
         mut direction: Option<Result<(), Status>>,
         watch: &mut Watch<'_>,
     ) -> Status {
-        if !(now.merit.cost.is_finite() && now.merit.gap.is_finite()) {
+        if !now.is_finite() {
             return Status::NotFinite;
         }
-        let usual = if self.bounded { settings.tolerance_bounded } else { settings.tolerance };
-        let tolerance = pass.tolerance.unwrap_or(usual);
         let mut search = Search::default();
         for iteration in 0..pass.most(settings) {
-            if search.accepted {
-                now.merit.gap = self.iterate.update_gaps(problem);
-            }
-            let is_new = search.accepted || iteration == 0;
             let known = direction.take();
-            if let Err(status) = known.unwrap_or_else(|| self.find_direction(problem, settings, now, is_new, watch)) {
+            if let Err(status) =
+                self.begin_iteration(problem, settings, now, [iteration == 0, search.accepted], known, watch)
+            {
                 return status;
             }
-            let Self { iterate, line_search, best, sweep, clock, .. } = self;
-            let (merit, feedback) = (now.merit, sweep.feedback());
-            let around = Surroundings { iterate, merit, best, feedback, settings, clock, watch };
-            search = line_search.run(problem, around, search);
-            if let Some(status) = search.stopped {
+            search = self.search(problem, settings, now, search, watch);
+            if let Some(status) = self.end_iteration(settings, pass, now, iteration, &search, watch) {
                 return status;
-            }
-            now.advance(&search, settings, self.iterate.solution.cost);
-            let Merit { gap, cost, feasible, regularisation, .. } = now.merit;
-            let Search { step, d1, d2, decrease, expected_decrease, accepted, .. } = search;
-            let stop = (d1 + 0.5 * d2).abs(); // expected decrease for α = 1
-            let record = Iteration {
-                iteration,
-                cost,
-                gap,
-                stop,
-                step,
-                regularisation,
-                d1,
-                d2,
-                decrease,
-                expected_decrease,
-                feasible,
-                accepted,
-            };
-            self.iterate.solution.trace.push(record);
-            self.clock.end_guarantee();
-            let verdict = watch.iteration(&record);
-            if regularisation == settings.regularisation_max {
-                return Status::RegularisationLimit;
-            }
-            if now.was_feasible && stop < tolerance {
-                return Status::Converged;
-            }
-            if verdict.is_break() {
-                return Status::Interrupted;
-            }
-            if pass.to_full_step.is_some() && accepted && step == 1.0 {
-                return Status::FullStep;
             }
         }
         Status::MaxIterations
+    }
+
+    /// Makes the first half of an iteration: finds the search direction, unless it is `known`. `[first, moved]` are
+    /// whether this is the first iteration of a pass, and whether the last iteration accepted a step.
+    ///
+    /// # Errors
+    /// The reason to stop.
+    pub(super) fn begin_iteration(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        now: &mut Progress,
+        [first, moved]: [bool; 2],
+        known: Option<Result<(), Status>>,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Status> {
+        if moved {
+            now.merit.gap = self.iterate.update_gaps(problem);
+        }
+        known.unwrap_or_else(|| self.find_direction(problem, settings, now, first || moved, watch))
+    }
+
+    /// Makes the line search of an iteration; `last` is the search of the iteration before.
+    fn search(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        now: &Progress,
+        last: Search,
+        watch: &mut Watch<'_>,
+    ) -> Search {
+        let (line_search, around, clock) = self.surroundings(settings, now);
+        line_search.run(problem, around, last, clock, watch)
+    }
+
+    /// Returns the line search, the iterate with its feedback, and the clock.
+    pub(super) fn surroundings<'a>(
+        &'a mut self,
+        settings: &'a Settings,
+        now: &Progress,
+    ) -> (&'a mut LineSearch, Surroundings<'a>, &'a mut Clock) {
+        let Self { iterate, line_search, best, sweep, clock, .. } = self;
+        let (merit, feedback) = (now.merit, sweep.feedback());
+        (line_search, Surroundings { iterate, merit, best, feedback, settings }, clock)
+    }
+
+    /// Ends an iteration after its line search: updates the progress, and adds the iteration to the trace. Returns the
+    /// reason to stop, if there is one.
+    pub(super) fn end_iteration(
+        &mut self,
+        settings: &Settings,
+        pass: Pass,
+        now: &mut Progress,
+        iteration: usize,
+        search: &Search,
+        watch: &mut Watch<'_>,
+    ) -> Option<Status> {
+        if search.stopped.is_some() {
+            return search.stopped;
+        }
+        let usual = if self.bounded { settings.tolerance_bounded } else { settings.tolerance };
+        let tolerance = pass.tolerance.unwrap_or(usual);
+        now.advance(search, settings, self.iterate.solution.cost);
+        let Merit { gap, cost, feasible, regularisation, .. } = now.merit;
+        let Search { step, d1, d2, decrease, expected_decrease, accepted, .. } = *search;
+        let stop = (d1 + 0.5 * d2).abs(); // expected decrease for α = 1
+        let record = Iteration {
+            iteration,
+            cost,
+            gap,
+            stop,
+            step,
+            regularisation,
+            d1,
+            d2,
+            decrease,
+            expected_decrease,
+            feasible,
+            accepted,
+        };
+        self.iterate.solution.trace.push(record);
+        self.clock.end_guarantee();
+        let verdict = watch.iteration(&record);
+        if regularisation == settings.regularisation_max {
+            Some(Status::RegularisationLimit)
+        } else if now.was_feasible && stop < tolerance {
+            Some(Status::Converged)
+        } else if verdict.is_break() {
+            Some(Status::Interrupted)
+        } else if pass.to_full_step.is_some() && accepted && step == 1.0 {
+            Some(Status::FullStep)
+        } else {
+            None
+        }
     }
 
     /// Computes the derivatives, if the iterate is new, and then the feedback by a sweep. The sweep is repeated with a
@@ -427,17 +496,38 @@ impl SolverLoop {
         solution.feasible = now.merit.feasible;
         solution.regularisation = regularisation;
         solution.status = status;
-        if !now.swept {
-            return; // keep the gains of the previous solve, shifted or not
+        if now.swept {
+            self.store_gains(&mut now); // else, the gains of the previous solve stay, shifted or not
         }
+    }
+
+    /// Copies the gains of the last sweep to the solution.
+    pub(super) fn store_gains(&mut self, now: &mut Progress) {
+        let solution = &mut self.iterate.solution;
         for ((K, k), feedback) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.feedback()) {
             K.copy_from(&feedback.K);
             k.copy_from(&feedback.k);
+        }
+        now.swept = false;
+    }
+
+    /// Exchanges the linear-quadratic problem and the sweep of this loop for `knots` and `sweep`. The next sweep starts
+    /// from the feed-forward in the solution, if this loop has `swept` before.
+    pub(super) fn exchange(&mut self, knots: &mut Vec<LqKnot>, sweep: &mut Sweep, swept: bool) {
+        std::mem::swap(&mut self.knots, knots);
+        std::mem::swap(&mut self.sweep, sweep);
+        if swept {
+            self.sweep.start_from(&self.iterate.solution.k);
         }
     }
 }
 
 impl Progress {
+    /// Returns whether the cost and the gaps of the iterate are finite.
+    pub(super) fn is_finite(&self) -> bool {
+        self.merit.cost.is_finite() && self.merit.gap.is_finite()
+    }
+
     /// Updates the progress after a line search; the iterate now has the given cost.
     fn advance(&mut self, search: &Search, settings: &Settings, cost: f64) {
         let Self { merit, was_feasible, swept_best, .. } = self;

@@ -342,8 +342,19 @@ impl Problem {
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
     pub fn try_clone(&self) -> Result<Self, Error> {
+        self.copy(None)
+    }
+
+    /// Copies the problem as [`try_clone`](Self::try_clone) does. The copy uses scratch memory of `other`, which the
+    /// same thread must use.
+    pub(crate) fn try_clone_beside(&self, other: &Self) -> Result<Self, Error> {
+        self.copy(Some(&*other.models.actions[0]))
+    }
+
+    fn copy(&self, beside: Option<&dyn ActionModel>) -> Result<Self, Error> {
         let Self { x0, models, knot_models, terminal, shape, runs: own_runs, knots, unread, .. } = self;
-        let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
+        let (x0, knot_models, shape) = (x0.clone(), knot_models.clone(), shape.clone());
+        let models = models.try_clone(beside)?;
         let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
         share(&*models.actions[0], &mut *terminal);
         reserve(&mut *terminal);
@@ -462,6 +473,17 @@ impl Problem {
             }
         }
         Ok(bounded)
+    }
+
+    /// Returns whether each knot of both problems can be computed in one batch: the problems have the same shape, and
+    /// differ only in durations, weights, targets and bounds. Actions without groups are always computed one by one.
+    pub(crate) fn matches(&self, other: &Self) -> bool {
+        let knot_matches = |t: usize| match (self.action(t).knot_group(), other.action(t).knot_group()) {
+            (Some(own), Some(_)) => own.matches(other.action(t), t),
+            (None, None) => true,
+            _ => false,
+        };
+        self.shape.check(&other.shape).is_ok() && (0..=self.horizon()).all(knot_matches)
     }
 
     /// Returns the largest number of lanes among all models.

@@ -88,6 +88,22 @@ impl<'a> Group<'a> {
     }
 }
 
+/// Costs and limits of the lanes of a batch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LaneTerms<'a> {
+    /// Costs and limits of the robot that computes the batch.
+    pub own: &'a HorizonTerms,
+    /// Costs and limits of each lane, where they belong to another robot; empty if all lanes belong to one robot.
+    pub each: &'a [Option<&'a HorizonTerms>],
+}
+
+impl<'a> LaneTerms<'a> {
+    /// Returns the costs and limits of the robot to which a lane belongs.
+    fn of(self, lane: usize) -> &'a HorizonTerms {
+        self.each.get(lane).copied().flatten().unwrap_or(self.own)
+    }
+}
+
 /// Workspace of each kind of dynamics.
 #[derive(Debug)]
 pub(crate) enum Pass<S> {
@@ -166,12 +182,12 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     /// Computes the dynamics of the knots of `group`, from the efforts or accelerations in the data of each knot. Also
     /// computes the quantities that residuals read. This is limited to knots whose residuals differ only in their
     /// targets from the residuals of the first knot.
-    pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: &HorizonTerms, to: &mut [KnotData]) {
+    pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: LaneTerms<'_>, to: &mut [KnotData]) {
         self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
         match group.what {
             Evaluation::Equations { .. } => self.run_equations(model, to),
-            what => self.run_pass(model, what == Evaluation::Derivatives, terms.layout().forces, to),
+            what => self.run_pass(model, what == Evaluation::Derivatives, terms.own.layout().forces, to),
         }
         if group.what != Evaluation::Values {
             self.groups.run_steps(model, [&self.v, &self.a], group.durations, to);
@@ -285,7 +301,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         &mut self,
         model: &Model,
         group: Group<'_>,
-        terms: &HorizonTerms,
+        terms: LaneTerms<'_>,
         to: &mut KnotData,
     ) {
         let to = core::slice::from_mut(to);
@@ -300,14 +316,14 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         &mut self,
         model: &Model,
         Group { knots, what, limited, .. }: Group<'_>,
-        terms: &HorizonTerms,
+        terms: LaneTerms<'_>,
         to: &mut [KnotData],
     ) {
-        let first = terms.at(knots[0], limited);
+        let first = terms.of(0).at(knots[0], limited);
         let mut each = [first; WIDEST];
         for (k, to) in to.iter_mut().enumerate() {
-            to.residuals.reserve(model.nv(), terms.layouts());
-            let own = terms.at(knots[k], limited);
+            to.residuals.reserve(model.nv(), terms.of(k).layouts());
+            let own = terms.of(k).at(knots[k], limited);
             to.residuals.is_written = own.is_alike(first);
             if to.residuals.is_written {
                 each[k] = own;

@@ -1,7 +1,7 @@
 //! Dynamics of a robot, for all kinds of dynamics: accelerations, costs and limits for a group of knots.
 #![allow(non_snake_case)] // names follow the literature: J
 
-use super::batch::{DynamicsKind, Group, KnotBatch, Long, Pass, Short};
+use super::batch::{DynamicsKind, Group, KnotBatch, LaneTerms, Long, Pass, Short};
 use super::group_kernel::BLOCK;
 use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
@@ -365,6 +365,30 @@ impl RobotDynamics {
     /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, in one batch if that is
     /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
+        self.solve_with(group, &[]);
+    }
+
+    /// Computes the dynamics of one knot of several problems into the workspace, in one batch. `each` has the costs and
+    /// limits of each lane; `None` stands for the costs and limits of this robot.
+    pub(crate) fn solve_across(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
+        self.solve_with(group, each);
+    }
+
+    /// Exchanges the results at one knot of the last group with the results at the first knot of another robot.
+    pub(crate) fn exchange(&mut self, lane: usize, other: &mut Self) {
+        core::mem::swap(&mut self.parts().work.data[lane], &mut other.parts().work.data[0]);
+    }
+
+    /// Returns whether both robots have the same dynamics, and knot t of both reads the same quantities: the knots may
+    /// be computed in one batch.
+    pub(crate) fn matches(&self, other: &Self, t: usize) -> bool {
+        Arc::ptr_eq(&self.model, &other.model)
+            && (&self.kind, &self.actuation, &self.capabilities) == (&other.kind, &other.actuation, &other.capabilities)
+            && self.terms.at(t, true).is_alike(other.terms.at(t, true))
+    }
+
+    /// Computes the dynamics of a group, whose lanes may belong to several robots.
+    fn solve_with(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
         let Group { knots, xs, us, what, durations, .. } = group;
         if let Evaluation::Equations { motions, .. } = what {
             match motions.is_empty() {
@@ -373,6 +397,7 @@ impl RobotDynamics {
             }
         }
         let Parts { model, actuation, terms, capabilities, work, .. } = self.parts();
+        let terms = LaneTerms { own: terms, each };
         let Work { single, vectors, impact, data, .. } = work;
         let (nu, nx, count) = (capabilities.nu, model.nq() + model.nv(), knots.len());
         let alone = |k: usize| {
@@ -381,8 +406,8 @@ impl RobotDynamics {
         };
         let data = &mut data[..count];
         if let Some(impact) = impact {
-            let terms_at = terms.at(knots[0], group.limited);
-            data[0].residuals.reserve(model.nv(), terms.layouts());
+            let terms_at = terms.own.at(knots[0], group.limited);
+            data[0].residuals.reserve(model.nv(), terms.own.layouts());
             impact.run(model, &mut single.data.get(), xs, terms_at, what != Evaluation::Values, &mut data[0]);
             return single.run_residuals_at(model, group, terms, &mut data[0]);
         }
@@ -394,8 +419,9 @@ impl RobotDynamics {
             }
         }
         let equations = matches!(what, Evaluation::Equations { .. });
-        match vectors.as_mut().filter(|_| count >= WORTHWHILE || equations) {
-            Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || what != Evaluation::Values => {
+        let (several, across) = (count > Short::LANES || what != Evaluation::Values, !each.is_empty());
+        match vectors.as_mut().filter(|_| count >= WORTHWHILE || equations || across) {
+            Some(VectorBatches { long: Some(long), .. }) if several || across => {
                 long.run(model, group, terms, data);
             }
             Some(VectorBatches { short, .. }) => short.run(model, group, terms, data),
@@ -443,7 +469,7 @@ impl RobotDynamics {
         let Work { single, data, da_du, .. } = work;
         if equations && !inverse {
             let group = Group { knots: &[t], xs: x, us: u, what: Evaluation::Derivatives, limited, durations: &[] };
-            single.run(model, group, terms, &mut data[lane..=lane]);
+            single.run(model, group, LaneTerms { own: terms, each: &[] }, &mut data[lane..=lane]);
         }
         let data = &data[lane];
         let [da_dq, da_dv, da_dtau] = &data.da;

@@ -17,7 +17,7 @@ pub(super) fn robot_mut<M: ContinuousModel>(model: &mut M) -> Option<&mut RobotD
 }
 
 /// Panic message if a model that was checked to be a robot is not a robot.
-const ROBOT: &str = "the model is a robot";
+pub(super) const ROBOT: &str = "the model is a robot";
 
 /// Returns the Jacobians of the step at one knot of the last group in [`solve`], if [`solve`] computed them: see
 /// [`KnotData::steps`](crate::robot::knot_data::KnotData::steps).

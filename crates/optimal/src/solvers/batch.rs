@@ -1,0 +1,433 @@
+//! Solution of many problems of one shape by FDDP, several at a time in the lanes of SIMD registers.
+
+use super::rollout::{Nominal, SeveralProblems, Trials};
+use super::search::Search;
+use super::settings::Settings;
+use super::solution::{Iteration, Solution, Status};
+use super::solver_loop::{Pass, Progress, SolverLoop};
+use super::watch::{Observer, Watch};
+use crate::error::Error;
+use crate::lq::{LqKnot, Sweep};
+use crate::problem::Problem;
+use crate::solvers::fddp::Fddp;
+use crate::time::Instant;
+use condyle_linalg::threads::join;
+use core::ops::ControlFlow;
+use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+/// Minimum time between two calls of [`ManyProblems::go_on`].
+const PERIOD: Duration = Duration::from_millis(10);
+
+/// Problems that a [`BatchFddp`] solves, and the receiver of their solutions.
+///
+/// The methods are called from several threads, for one problem after the other, in any order.
+pub trait ManyProblems: Sync {
+    /// Error that excludes a problem.
+    type Error: From<Error>;
+
+    /// Prepares problem `i`. `problem` is a copy of the nominal problem, which may have been changed for an earlier
+    /// problem: this method must set everything that differs between problems. `xs` ((N + 1)·nx) and `us` contain the
+    /// nominal warm start, which this method may change.
+    ///
+    /// # Errors
+    /// An error that excludes this problem. It is passed to [`solved`](Self::solved).
+    fn start(&self, i: usize, problem: &mut Problem, xs: &mut [f64], us: &mut [f64]) -> Result<(), Self::Error>;
+
+    /// Receives the solution of problem `i`, or the error that excluded it. `problem` is as `start` left it, and is
+    /// used for a later problem.
+    fn solved(&self, i: usize, problem: &mut Problem, result: Result<&Solution, Self::Error>);
+
+    /// Returns whether to continue. This method is called at most every 10 ms on each thread.
+    fn go_on(&self) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// Solver of many problems that have the same shape: the same numbers of knots, states and controls, and the same kinds
+/// of dynamics and costs. The problems may differ in initial states, targets, weights, bounds and durations.
+///
+/// As many problems as a SIMD register has lanes are solved together. Each problem has its own iterations of [`Fddp`]:
+/// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. A
+/// problem that has ended is replaced by the next one. Each thread solves its own problems.
+///
+/// The result of a problem does not depend on the other problems, to the bit. It differs from the result of [`Fddp`] by
+/// rounding at most, because [`Fddp`] rolls out a single trial by another algorithm. If a problem has other dynamics or
+/// other kinds of costs than the nominal problem, it is solved alone, by [`Fddp`]. The same holds for different contact
+/// placements.
+///
+/// ```
+/// use condyle_optimal::{BatchFddp, Error, LqKnot, Lqr, ManyProblems, Problem, Solution};
+/// use std::sync::Mutex;
+///
+/// /// Problems x⁺ = x + u, ℓ = ½ (x² + u²), from different initial states.
+/// struct Starts { x0: Vec<f64>, costs: Mutex<Vec<f64>> }
+///
+/// impl ManyProblems for Starts {
+///     type Error = Error;
+///
+///     fn start(&self, i: usize, problem: &mut Problem, xs: &mut [f64], _: &mut [f64]) -> Result<(), Error> {
+///         xs.fill(self.x0[i]);
+///         problem.set_x0(&self.x0[i..=i])
+///     }
+///
+///     fn solved(&self, i: usize, _: &mut Problem, result: Result<&Solution, Error>) {
+///         self.costs.lock().unwrap()[i] = result.map_or(f64::NAN, |solution| solution.cost);
+///     }
+/// }
+///
+/// let (mut knot, mut end) = (LqKnot::zeros(1, 1), LqKnot::zeros(1, 0));
+/// (knot.A[0], knot.B[0], knot.Q[0], knot.R[0], end.Q[0]) = (1.0, 1.0, 1.0, 1.0, 1.0);
+/// let problem = Problem::new(vec![1.0], vec![Box::new(Lqr::new(knot))], vec![0; 30], Box::new(Lqr::new(end)))?;
+///
+/// let starts = Starts { x0: vec![1.0, 2.0, f64::NAN], costs: Mutex::new(vec![0.0; 3]) };
+/// let mut solver = BatchFddp::new(&problem, 1)?;
+/// assert_eq!(solver.solve(3, &starts)?, 3);
+/// let costs = starts.costs.into_inner().unwrap();
+/// assert!((costs[1] - 4.0 * costs[0]).abs() < 1e-12 && costs[2].is_nan()); // the third problem fails alone
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct BatchFddp {
+    /// Settings of each solve. [`threads`](Settings::threads) and [`segments`](Settings::segments) are not used. The
+    /// [`time_budget`](Settings::time_budget) applies to each call of [`solve`](Self::solve), not to each problem.
+    pub settings: Settings,
+    workers: Vec<Worker>,
+}
+
+/// Solver of one thread.
+#[derive(Debug)]
+struct Worker {
+    nominal: Problem,
+    /// Nominal warm start: states and controls.
+    start: [Vec<f64>; 2],
+    slots: Vec<Slot>,
+    trials: Trials,
+    /// Linear-quadratic problem and sweep, which all slots use in turn, so that they stay in the caches.
+    linear: Linear,
+    /// Solver of a problem that cannot share lanes.
+    alone: Option<Fddp>,
+}
+
+/// Storage of a linear-quadratic problem, and its sweep.
+#[derive(Debug)]
+struct Linear {
+    knots: Vec<LqKnot>,
+    sweep: Sweep,
+}
+
+/// Place for one of the problems that are solved together.
+#[derive(Debug)]
+struct Slot {
+    problem: Problem,
+    solver: SolverLoop,
+    task: Option<Task>,
+}
+
+/// Problem that is being solved.
+#[derive(Debug)]
+struct Task {
+    index: usize,
+    begin: Instant,
+    now: Progress,
+    iteration: usize,
+    search: Search,
+    /// Number of step lengths that this search has tried.
+    tried: usize,
+}
+
+/// Distribution of the problems of a call among the threads.
+struct Queue<'a, P> {
+    problems: &'a P,
+    settings: &'a Settings,
+    count: usize,
+    next: AtomicUsize,
+    /// Reason why no more iterations are made.
+    is_over: AtomicBool,
+    is_interrupted: AtomicBool,
+    begin: Instant,
+}
+
+/// Observer that lets a solve run to its end.
+struct Unobserved;
+
+impl Observer for Unobserved {
+    fn iteration(&mut self, _: &Iteration) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+impl BatchFddp {
+    /// Creates a solver with the default settings, and with copies of the nominal problem for `threads` threads. The
+    /// nominal warm start is x̂₀ at all knots, and the controls that hold x̂₀ still. Allocates.
+    ///
+    /// # Errors
+    /// [`Error::NoCopy`] for an action that cannot be copied.
+    pub fn new(problem: &Problem, threads: usize) -> Result<Self, Error> {
+        let mut nominal = problem.try_clone()?;
+        let [xs, us] = super::start::quasi_static_start(&mut nominal)?;
+        let workers = (0..threads.max(1)).map(|_| Worker::new(problem, [&xs, &us])).collect::<Result<_, _>>()?;
+        Ok(Self { settings: Settings::default(), workers })
+    }
+
+    /// Sets the nominal warm start: the states ((N + 1)·nx, gaps allowed) and the controls from which all problems
+    /// start, unless [`ManyProblems::start`] changes them.
+    ///
+    /// # Errors
+    /// [`Error`] if a length is wrong or a number is not finite. The old warm start is then kept.
+    pub fn set_start(&mut self, xs: &[f64], us: &[f64]) -> Result<(), Error> {
+        let [old_xs, old_us] = &self.workers[0].start;
+        Error::check("xs", xs, old_xs.len())?;
+        Error::check("us", us, old_us.len())?;
+        for worker in &mut self.workers {
+            worker.start[0].copy_from_slice(xs);
+            worker.start[1].copy_from_slice(us);
+        }
+        Ok(())
+    }
+
+    /// Solves the problems 0 … `count` − 1. Returns the number of problems that were passed to
+    /// [`ManyProblems::solved`]. It is below `count` if time is over or [`ManyProblems::go_on`] ends the solve: the
+    /// problems that are being solved then end with [`Status::TimeLimit`] or [`Status::Interrupted`], and the others do
+    /// not start.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for an invalid setting.
+    pub fn solve(&mut self, count: usize, problems: &impl ManyProblems) -> Result<usize, Error> {
+        self.settings.check()?;
+        let settings = Settings { threads: 1, segments: 1, time_budget: None, ..self.settings.clone() };
+        let queue = Queue {
+            problems,
+            settings: &settings,
+            count,
+            next: AtomicUsize::new(0),
+            is_over: AtomicBool::new(false),
+            is_interrupted: AtomicBool::new(false),
+            begin: Instant::now(),
+        };
+        spread(&mut self.workers, &queue, self.settings.time_budget);
+        Ok(queue.next.into_inner().min(count))
+    }
+}
+
+/// Lets each worker solve problems of the queue.
+fn spread<P: ManyProblems>(workers: &mut [Worker], queue: &Queue<'_, P>, budget: Option<Duration>) {
+    match workers {
+        [worker] => worker.run(queue, budget),
+        workers => {
+            let (one, other) = workers.split_at_mut(workers.len() / 2);
+            join(|| spread(one, queue, budget), || spread(other, queue, budget));
+        }
+    }
+}
+
+impl<P: ManyProblems> Queue<'_, P> {
+    /// Returns the index of the next problem, unless all problems have started or the call ends early.
+    fn take(&self) -> Option<usize> {
+        if self.is_over.load(Ordering::Relaxed) || self.is_interrupted.load(Ordering::Relaxed) {
+            return None;
+        }
+        let taken = self.next.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |i| (i < self.count).then_some(i + 1));
+        taken.ok()
+    }
+
+    /// Returns the reason to end the call early, if there is one. Calls the observer if `asked` was long ago.
+    fn stops(&self, budget: Option<Duration>, asked: &mut Instant) -> Option<Status> {
+        let now = Instant::now();
+        if budget.is_some_and(|budget| now.duration_since(self.begin) >= budget) {
+            self.is_over.store(true, Ordering::Relaxed);
+        }
+        if now.duration_since(*asked) >= PERIOD {
+            *asked = now;
+            if self.problems.go_on().is_break() {
+                self.is_interrupted.store(true, Ordering::Relaxed);
+            }
+        }
+        match (self.is_interrupted.load(Ordering::Relaxed), self.is_over.load(Ordering::Relaxed)) {
+            (true, _) => Some(Status::Interrupted),
+            (_, true) => Some(Status::TimeLimit),
+            _ => None,
+        }
+    }
+}
+
+impl Worker {
+    /// Creates the solver of one thread.
+    fn new(problem: &Problem, [xs, us]: [&[f64]; 2]) -> Result<Self, Error> {
+        let width = problem.lanes();
+        let nominal = problem.try_clone()?;
+        let slot = || {
+            let problem = problem.try_clone_beside(&nominal)?;
+            Ok(Slot { solver: SolverLoop::for_batch(&problem), problem, task: None })
+        };
+        let mut trials = Trials::new(&nominal, width);
+        trials.keep_motions(nominal.motion_size());
+        let slots = (0..width).map(|_| slot()).collect::<Result<_, Error>>()?;
+        let knots = SolverLoop::knots_of(&nominal);
+        let linear = Linear { sweep: Sweep::new(&knots), knots };
+        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, linear, alone: None })
+    }
+
+    /// Solves problems until the queue is empty or a reason to stop exists.
+    fn run<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, budget: Option<Duration>) {
+        let mut asked = Instant::now();
+        loop {
+            let stop = queue.stops(budget, &mut asked);
+            for k in 0..self.slots.len() {
+                if let Some(status) = stop
+                    && let Some(task) = self.slots[k].task.take()
+                {
+                    self.slots[k].end(queue, task, status, &mut self.linear);
+                }
+                while stop.is_none() && self.slots[k].task.is_none() {
+                    let Some(index) = queue.take() else { break };
+                    self.begin(k, index, queue);
+                }
+            }
+            if self.slots.iter().all(|slot| slot.task.is_none()) {
+                return;
+            }
+            self.search(queue);
+        }
+    }
+
+    /// Begins problem `index` in slot k. A problem that cannot share lanes is solved at once.
+    fn begin<P: ManyProblems>(&mut self, k: usize, index: usize, queue: &Queue<'_, P>) {
+        let Self { nominal, start, slots, alone, linear, .. } = self;
+        let Slot { problem, solver, .. } = &mut slots[k];
+        let begin = Instant::now();
+        let [mut xs, mut us] = start.clone();
+        let prepared = queue.problems.start(index, problem, &mut xs, &mut us);
+        if let Err(error) = prepared {
+            return queue.problems.solved(index, problem, Err(error));
+        }
+        if !problem.matches(nominal) {
+            let alone = alone.get_or_insert_with(|| Fddp::new(nominal));
+            alone.settings = queue.settings.clone();
+            let result = alone.solve(problem, &xs, &us).map_err(P::Error::from);
+            return queue.problems.solved(index, problem, result);
+        }
+        solver.exchange(&mut linear.knots, &mut linear.sweep, false);
+        let begun = solver.begin(problem, queue.settings, Some([&xs, &us]));
+        let now = begun.map(|()| {
+            solver.start_clock(queue.settings, &Watch::new(&mut Unobserved));
+            solver.start_pass(problem, queue.settings, Pass::default())
+        });
+        solver.exchange(&mut linear.knots, &mut linear.sweep, false);
+        let now = match now {
+            Ok(now) => now,
+            Err(error) => return queue.problems.solved(index, problem, Err(error.into())),
+        };
+        let task = Task { index, begin, now, iteration: 0, search: Search::default(), tried: 0 };
+        self.slots[k].advance(queue, task, linear);
+    }
+
+    /// Rolls out trials of all problems, and ends the line searches that accept a trial or have no more step lengths.
+    fn search<P: ManyProblems>(&mut self, queue: &Queue<'_, P>) {
+        let Self { slots, trials, linear, .. } = self;
+        let most = queue.settings.step_lengths;
+        // one trial for each problem, and then the next step lengths of the problems whose first trial was rejected
+        let mut counts: Vec<usize> = slots.iter().map(|slot| usize::from(slot.task.is_some())).collect();
+        let mut free = trials.width() - counts.iter().sum::<usize>();
+        while free > 0 {
+            let before = free;
+            for (slot, count) in slots.iter().zip(&mut counts) {
+                let Some(task) = &slot.task else { continue };
+                if task.tried > 0 && task.tried + *count < most && free > 0 {
+                    (*count, free) = (*count + 1, free - 1);
+                }
+            }
+            if free == before {
+                break;
+            }
+        }
+        let (mut problems, mut of, mut steps) = (Vec::new(), Vec::new(), Vec::new());
+        let horizon = slots[0].problem.horizon();
+        for (slot, &count) in slots.iter_mut().zip(&counts) {
+            let Some(task) = &slot.task else { continue };
+            let SolverLoop { iterate, line_search, .. } = &slot.solver;
+            let counts_gaps = queue.settings.counts_gaps(task.now.merit.feasible);
+            of.extend((0..count).map(|_| problems.len()));
+            steps.extend_from_slice(&line_search.steps()[task.tried..task.tried + count]);
+            problems.push((slot.problem.action_view(), Nominal::stored(iterate, counts_gaps)));
+        }
+        trials.run(&mut SeveralProblems { problems, of }, &steps, 0..=horizon);
+        let mut first = 0;
+        for (slot, &count) in slots.iter_mut().zip(&counts) {
+            let Some(mut task) = slot.task.take() else { continue };
+            let Slot { problem, solver, .. } = slot;
+            let view = problem.action_view();
+            for i in first..first + count {
+                let (line_search, around, _) = solver.surroundings(queue.settings, &task.now);
+                let accepted = line_search.judge(around, &mut task.search, (trials, i, task.tried), &view);
+                task.tried += 1;
+                if accepted {
+                    break;
+                }
+            }
+            first += count;
+            if !(task.search.accepted || task.tried == most) {
+                slot.task = Some(task);
+                continue;
+            }
+            let watch = &mut Unobserved;
+            let (now, iteration) = (&mut task.now, task.iteration);
+            let stop = solver.end_iteration(
+                queue.settings,
+                Pass::default(),
+                now,
+                iteration,
+                &task.search,
+                &mut Watch::new(watch),
+            );
+            task.iteration += 1;
+            match stop {
+                Some(status) => slot.end(queue, task, status, linear),
+                None => slot.advance(queue, task, linear),
+            }
+        }
+    }
+}
+
+impl Slot {
+    /// Begins the next iteration of a problem: derivatives, sweep, and the expected decrease of its line search. Ends
+    /// the solve if there is a reason to stop.
+    fn advance<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, mut task: Task, linear: &mut Linear) {
+        let Self { problem, solver, .. } = self;
+        let (settings, Linear { knots, sweep }) = (queue.settings, &mut *linear);
+        if !task.now.is_finite() && task.iteration == 0 {
+            return self.end(queue, task, Status::NotFinite, linear);
+        }
+        if task.iteration == Pass::default().most(settings) {
+            return self.end(queue, task, Status::MaxIterations, linear);
+        }
+        // the derivatives are always computed, because other problems have used their storage
+        let steps = [true, task.search.accepted];
+        solver.exchange(knots, sweep, task.iteration > 0);
+        let mut observer = Unobserved;
+        let watch = &mut Watch::new(&mut observer);
+        let found = solver.begin_iteration(problem, settings, &mut task.now, steps, None, watch);
+        if found.is_ok() {
+            let (line_search, around, _) = solver.surroundings(settings, &task.now);
+            task.search = line_search.begin(&around, task.search);
+            solver.store_gains(&mut task.now);
+        }
+        solver.exchange(knots, sweep, false);
+        if let Err(status) = found {
+            return self.end(queue, task, status, linear);
+        }
+        task.tried = 0;
+        self.task = Some(task);
+    }
+
+    /// Completes a solution and passes it on.
+    fn end<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, task: Task, status: Status, linear: &mut Linear) {
+        let Self { problem, solver, .. } = self;
+        solver.exchange(&mut linear.knots, &mut linear.sweep, task.iteration > 0);
+        solver.finish(problem, queue.settings, task.now, status);
+        solver.exchange(&mut linear.knots, &mut linear.sweep, false);
+        let solution = &mut solver.iterate.solution;
+        solution.timings.end(task.begin.elapsed(), None);
+        queue.problems.solved(task.index, problem, Ok(solution));
+    }
+}
