@@ -111,6 +111,12 @@ impl SolverLoop {
         }
     }
 
+    /// Returns the mean number of bytes that a sweep reads from a knot before the terminal one.
+    pub(super) fn bytes_per_knot(&self) -> usize {
+        let horizon = self.knots.len() - 1;
+        self.knots[..horizon].iter().map(LqKnot::bytes).sum::<usize>() / horizon.max(1)
+    }
+
     /// Begins an attempt to solve `problem`, from a warm start if one is given, else from the last trajectory.
     ///
     /// # Errors
