@@ -26,6 +26,8 @@ pub struct KnotFeedback {
     pub expected: [f64; 2],
     /// Whether K, Qu and Quu store factors instead of results. [`Gains::finish`] computes K and k from these factors.
     pub(super) gains_deferred: bool,
+    /// Product Vxx⁺ f of the next knot's Hessian Vxx⁺ and the gap f, ndx; zero without a gap.
+    pub(crate) curved_gap: DVector<f64>,
     /// Factors for the forward pass, if the sweep was asked for them instead of gains.
     pub(crate) factors: Factors,
 }
@@ -42,6 +44,7 @@ impl KnotFeedback {
             Quu: DMatrix::zeros(nu, nu),
             expected: [0.0; 2],
             gains_deferred: false,
+            curved_gap: DVector::zeros(ndx),
             factors: Factors::default(),
         }
     }

@@ -60,6 +60,14 @@ impl Workspace {
         }
     }
 
+    /// Computes P f, the product with a gap f.
+    pub(crate) fn curve(&self, f: &[f64], to: &mut [f64]) {
+        to.fill(0.0);
+        if f.iter().any(|f| *f != 0.0) {
+            add_scaled_product(to, 1.0, View::new(&self.P, padded(f.len())), f);
+        }
+    }
+
     /// Copies the value function from H (stride `ld`) to P = Vxx and p = Vx. The first `eliminated` columns of H are
     /// eliminated, and the states of H are rotated by `turn`.
     pub(crate) fn take_value(&mut self, ld: usize, eliminated: usize, turn: usize) {

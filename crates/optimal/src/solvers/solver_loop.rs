@@ -293,7 +293,7 @@ impl SolverLoop {
         watch: &mut Watch<'_>,
     ) -> Result<(), Status> {
         let Merit { feasible, .. } = now.merit;
-        self.sweep.keep_values(settings.counts_gaps(feasible));
+        self.sweep.keep_values(false);
         let mut swept = None;
         if is_new {
             let phases = [Phase::CalcDiff, Phase::Sweep];
