@@ -1,4 +1,6 @@
-//! Robot models that several benchmarks use.
+//! Robot models and motions that several benchmarks use.
+
+pub mod motions;
 
 use condyle::spatial::Mat3;
 use condyle::tree::BodyId;

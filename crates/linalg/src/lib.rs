@@ -17,6 +17,7 @@
 #[cfg_attr(not(feature = "std"), macro_use)]
 extern crate alloc;
 
+mod aligned;
 #[doc(hidden)]
 pub mod axpy;
 mod cast;
@@ -46,6 +47,7 @@ mod tile;
 pub mod tree_product;
 mod vectors;
 
+pub use aligned::{Aligned, padded};
 pub use cholesky::Cholesky;
 pub use copy::{
     copy_block, copy_lower, copy_matrix, copy_symmetric, copy_symmetric_turned, copy_with_squares, transpose,

@@ -1,6 +1,7 @@
 //! Sums of outer products of rows that contain blocks of zeros.
 #![allow(unsafe_code)]
 
+use crate::aligned::Aligned;
 use crate::compiled::compiled;
 use crate::registers::Vector;
 use crate::tile::{SLACK, Store, add_outer, next_strip, store_tile};
@@ -11,7 +12,7 @@ use alloc::vec::Vec;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SparseRows {
     /// Numbers of all rows; each row is padded with zeros up to the stride.
-    pub numbers: Vec<f64>,
+    pub numbers: Aligned,
     /// Mask of each row.
     pub masks: Vec<u64>,
 }
@@ -19,15 +20,15 @@ pub struct SparseRows {
 impl SparseRows {
     /// Sets the number of rows. Allocates only if this number is larger than in all earlier calls.
     pub fn resize(&mut self, rows: usize, stride: usize) {
-        self.numbers.resize(rows * stride, 0.0);
+        self.numbers.resize(rows * stride);
         self.masks.resize(rows, 0);
     }
 
     /// Computes the masks of all rows.
     #[inline(always)]
     pub fn mark(&mut self, stride: usize) {
-        for (to, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
-            *to = mask(row);
+        for k in 0..self.masks.len() {
+            self.masks[k] = mask(&self.numbers[k * stride..(k + 1) * stride]);
         }
     }
 }
@@ -38,8 +39,8 @@ impl SparseRows {
 pub fn mask(row: &[f64]) -> u64 {
     let (fours, rest) = row.as_chunks::<4>();
     let (wide, mut last, mut mask) = (block(row.len()).trailing_zeros() - 2, [0.0; 4], 0);
-    for (k, x) in fours.iter().enumerate() {
-        mask |= u64::from(any(x)) << (k >> wide);
+    for k in 0..fours.len() {
+        mask |= u64::from(any(&fours[k])) << (k >> wide);
     }
     if rest.is_empty() {
         return mask;
@@ -51,7 +52,8 @@ pub fn mask(row: &[f64]) -> u64 {
 /// Returns whether at least one of four numbers is nonzero. NaN counts as nonzero.
 #[inline(always)]
 fn any(x: &[f64; 4]) -> bool {
-    (x[0] != 0.0) | (x[1] != 0.0) | (x[2] != 0.0) | (x[3] != 0.0)
+    let bits = x[0].to_bits() | x[1].to_bits() | x[2].to_bits() | x[3].to_bits();
+    bits << 1 != 0 // without the sign, so that −0 counts as zero
 }
 
 /// Computes y −= Σ aᵢ xᵢ in whole registers. Numbers at the end of y that do not fill a register are not changed.
@@ -109,7 +111,7 @@ struct Place {
 #[derive(Debug, Clone, Default)]
 pub struct OuterProducts {
     /// Numbers of all rows.
-    pub rows: Vec<f64>,
+    pub rows: Aligned,
     /// Distance from one row to the next.
     stride: usize,
     /// Number of columns of the sum.
@@ -125,7 +127,7 @@ impl OuterProducts {
     /// Allocates memory for `products` products, and for rows with `numbers` numbers in total.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
         let places = Vec::with_capacity(products);
-        Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), places, ..Self::default() }
+        Self { rows: Aligned::zeros(numbers), runs: Vec::with_capacity(products), places, ..Self::default() }
     }
 
     /// Resets the sum to zero, with `size` columns. Rows are `stride` numbers apart.
@@ -146,7 +148,7 @@ impl OuterProducts {
         let first = self.count;
         self.count += count;
         if self.rows.len() < self.count * self.stride {
-            self.rows.resize(self.count * self.stride, 0.0);
+            self.rows.resize(self.count * self.stride);
         }
         first
     }

@@ -55,7 +55,8 @@ impl Vector for Pair {
     }
     #[inline(always)]
     fn store(self, x: &mut [f64]) {
-        x[..2].copy_from_slice(&self.0);
+        let x = &mut x[..2];
+        (x[0], x[1]) = (self.0[0], self.0[1]); // `copy_from_slice` may call memmove
     }
     #[inline(always)]
     fn splat(x: f64) -> Self {

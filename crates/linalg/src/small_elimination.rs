@@ -2,14 +2,14 @@
 //! each tile when the tile is computed.
 #![allow(unsafe_code, non_snake_case)] // H, X
 
-use crate::compiled::narrow;
+use crate::compiled::compiled;
 use crate::registers::Vector;
 use crate::tile::{View, add_outer, has_strip, holds};
 
 /// Number of columns of a tile.
 const COLUMNS: usize = 4;
 
-narrow! {
+compiled! {
     /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ, where xₖ are the
     /// columns of X.
     ///

@@ -1,6 +1,7 @@
 //! Tests of the dense kernels, at every SIMD level that this processor has.
 #![allow(non_snake_case)]
 
+mod aligned;
 mod copy;
 mod factor;
 mod outer;

@@ -35,7 +35,7 @@
 use super::knot::LqKnot;
 use super::step::Step;
 use condyle_linalg::{
-    SLACK, View, add_product_lower, add_scaled_product, copy_lower, copy_matrix, copy_symmetric, dot, eliminate,
+    View, add_product_lower, add_scaled_product, copy_lower, copy_matrix, copy_symmetric, dot, eliminate, padded,
     product_of_upper_lower, product_with_upper, transpose,
 };
 
@@ -49,7 +49,7 @@ pub(crate) struct Value {
 impl Value {
     /// Creates the value function of n states that is zero everywhere.
     pub(crate) fn zeros(n: usize) -> Self {
-        Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
+        Self { P: vec![0.0; padded(n) * n], p: vec![0.0; n] }
     }
 
     pub(crate) fn copy_from(&mut self, P: &[f64], p: &[f64]) {
@@ -73,15 +73,15 @@ pub(crate) struct SegmentValue {
 impl SegmentValue {
     /// Creates matrices Θ and C and a vector θ of zeros, for n states.
     pub(crate) fn zeros(n: usize) -> Self {
-        let square = || vec![0.0; (n + SLACK) * n];
+        let square = || vec![0.0; padded(n) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
     }
 
     /// Computes P, p, Θ, θ and C of a segment from its knots. Returns whether Quu was positive definite at all knots.
     pub(crate) fn run(&mut self, step: &mut Step, knots: &[LqKnot], regularisation: f64) -> bool {
-        let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
+        let (n, ld) = (self.theta.len(), padded(self.theta.len()));
         let work = &mut step.work;
-        for zero in [&mut work.P, &mut work.p, &mut self.Theta, &mut self.theta, &mut self.C] {
+        for zero in [&mut work.P[..], &mut work.p, &mut self.Theta, &mut self.theta, &mut self.C] {
             zero.fill(0.0);
         }
         for j in 0..n {
@@ -93,7 +93,7 @@ impl SegmentValue {
     /// Makes the recursion step of one knot. Returns whether Quu was positive definite.
     fn step(&mut self, step: &mut Step, knot: &LqKnot, regularisation: f64) -> bool {
         let (n, m) = (knot.ndx(), knot.nu());
-        let (ldt, last) = (n + SLACK, m + n);
+        let (ldt, last) = (padded(n), m + n);
         let Self { Theta, theta, C } = self;
         if knot.f.iter().any(|f| *f != 0.0) {
             add_scaled_product(theta, 1.0, View::new(Theta, ldt), knot.f.as_slice()); // θ + Θ f
@@ -124,7 +124,7 @@ impl SegmentValue {
 }
 
 /// Computation of the value function at the start of a segment from the value function at the end of the segment, with
-/// scratch. Matrices have padding rows and the stride n + 1 + SLACK.
+/// scratch. Matrices have padding rows and the stride `padded(n + 1)`.
 #[derive(Debug, Clone)]
 pub(crate) struct Link {
     /// Matrix C, with both triangles filled.
@@ -136,14 +136,14 @@ pub(crate) struct Link {
     CL: Vec<f64>,
     /// Matrix (C L)ᵀ, overwritten by [Θ, θ − C p₁]ᵀ.
     rows: Vec<f64>,
-    /// Matrix [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride 2n + 1 + SLACK.
+    /// Matrix [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride `padded(2 * n + 1)`.
     H: Vec<f64>,
 }
 
 impl Link {
     pub(crate) fn new(n: usize) -> Self {
-        let square = || vec![0.0; (n + 1 + SLACK) * n];
-        let H = vec![0.0; (2 * n + 1 + SLACK) * 2 * n];
+        let square = || vec![0.0; padded(n + 1) * n];
+        let H = vec![0.0; padded(2 * n + 1) * 2 * n];
         Self { C: square(), L: square(), upper: square(), CL: square(), rows: square(), H }
     }
 
@@ -151,7 +151,7 @@ impl Link {
     /// states have no cost; rounding then decides whether a pivot is positive. A second try therefore adds n rounding
     /// errors of the largest entry to the diagonal.
     fn factorise(&mut self, P: &[f64], n: usize) -> bool {
-        let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
+        let (ld, ldp) = (padded(n + 1), padded(n));
         let mut largest = 0.0_f64;
         for j in 0..n {
             largest = largest.max(P[j * ldp + j]);
@@ -176,7 +176,7 @@ impl Link {
     /// segment. P and p of the conditional value function are in `step`. Returns whether `end` is convex.
     pub(crate) fn run(&mut self, step: &Step, segment: &SegmentValue, end: &Value, start: &mut Value) -> bool {
         let (n, work) = (end.p.len(), &step.work);
-        let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
+        let (ld, ldp, ldh) = (padded(n + 1), padded(n), padded(2 * n + 1));
         if !self.factorise(&end.P, n) {
             return false;
         }

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // names follow the literature: K, Vxx, and Y, U
 
 use super::knot::LqKnot;
-use condyle_linalg::{SLACK, View, add_product_vector, copy_matrix, eliminate_rows, transpose};
+use condyle_linalg::{Aligned, SLACK, View, add_product_vector, copy_matrix, eliminate_rows, padded, transpose};
 use nalgebra::{DMatrix, DVector};
 
 /// Result of a sweep at one knot: the feedback δu = k + K δx, and the value function V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx +
@@ -26,6 +26,8 @@ pub struct KnotFeedback {
     pub expected: [f64; 2],
     /// Whether K, Qu and Quu store factors instead of results. [`Gains::finish`] computes K and k from these factors.
     pub(super) gains_deferred: bool,
+    /// Product Vxx⁺ f of the next knot's Hessian Vxx⁺ and the gap f, ndx; zero without a gap.
+    pub(crate) curved_gap: DVector<f64>,
     /// Factors for the forward pass, if the sweep was asked for them instead of gains.
     pub(crate) factors: Factors,
 }
@@ -42,6 +44,7 @@ impl KnotFeedback {
             Quu: DMatrix::zeros(nu, nu),
             expected: [0.0; 2],
             gains_deferred: false,
+            curved_gap: DVector::zeros(ndx),
             factors: Factors::default(),
         }
     }
@@ -77,7 +80,7 @@ impl Factors {
 #[derive(Debug, Clone)]
 pub(crate) struct Gains {
     /// Matrix U with columns for (w, δv, δq), overwritten by [Y K]; with padding rows.
-    rows: Vec<f64>,
+    rows: Aligned,
     /// Matrix [L; X; yᵀ] of a knot whose gains were deferred, with padding rows.
     left: Vec<f64>,
     /// Scratch of [`take_gains`].
@@ -87,7 +90,7 @@ pub(crate) struct Gains {
 impl Gains {
     /// Allocates the scratch for knots of n states and at most m controls.
     pub(super) fn new(n: usize, m: usize) -> Self {
-        Self { rows: vec![0.0; (m + SLACK) * (m + n)], left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
+        Self { rows: Aligned::zeros(padded(m) * (m + n)), left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
     }
 
     /// Allocates the scratch of [`new`](Self::new), and the matrix for deferred gains.
@@ -98,7 +101,7 @@ impl Gains {
     /// Computes the gains of a knot from [L; X; yᵀ], and writes them to the feedback.
     pub(super) fn write(&mut self, left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
         let (n, m, efforts) = (knot.ndx(), knot.nu(), &knot.inverse_dynamics.efforts.numbers);
-        let (Self { rows, y, .. }, ld, all) = (self, m + SLACK, m + n);
+        let (Self { rows, y, .. }, ld, all) = (self, padded(m), m + n);
         transpose(rows, ld, View::new(efforts, knot.inverse_dynamics.stride), [all, m]);
         eliminate_rows(rows, ld, [m, all, m], left);
         take_gains(View::new(rows, ld), left.at(all, 0), knot, feedback, y);

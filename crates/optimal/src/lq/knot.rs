@@ -102,6 +102,21 @@ impl LqKnot {
         self.r.len()
     }
 
+    /// Returns the number of bytes that a sweep reads from the knot. A knot in inverse-dynamics form has U, D, G and
+    /// the block of Q for δq instead of A, B, S, R and Q.
+    pub(crate) fn bytes(&self) -> usize {
+        let vectors = self.q.len() + self.f.len() + self.r.len();
+        let form = &self.inverse_dynamics;
+        let numbers = match self.structure.is_inverse_dynamics() {
+            true => {
+                let rows = form.efforts.numbers.len() + form.steps.numbers.len() + form.costs.numbers.len();
+                rows + 2 * form.slopes.len() + form.diagonal.len() + (self.ndx() / 2) * (self.ndx() / 2)
+            }
+            false => self.A.len() + self.B.len() + self.Q.len() + self.S.len() + self.R.len(),
+        };
+        (vectors + numbers) * size_of::<f64>()
+    }
+
     /// Returns whether a control has a bound.
     pub(crate) fn is_bounded(&self) -> bool {
         self.lower.iter().chain(&self.upper).any(|bound| bound.is_finite())

@@ -4,7 +4,7 @@
 use super::knot::LqKnot;
 use super::rows::{MOST_FORMS, RowGroup};
 use super::workspace::Workspace;
-use condyle_linalg::{SLACK, View, add_product_lower, add_scaled_product};
+use condyle_linalg::{SLACK, View, add_product_lower, add_scaled_product, padded};
 use core::ops::Range;
 
 /// Slopes and curvatures of the constraint rows of a horizon. They add to the cost of each knot
@@ -158,7 +158,7 @@ impl RowTerms<'_> {
 
     /// Adds the terms of the terminal knot t to P and p.
     pub(super) fn add_to_value(&self, t: usize, knot: &LqKnot, work: &mut Workspace) {
-        let stride = knot.ndx() + SLACK;
+        let stride = padded(knot.ndx());
         let Workspace { P, p, .. } = work;
         assert_eq!(knot.rows.groups().len(), 0, "a terminal knot has no forces");
         for ((first, entries), &[slope, curvature]) in

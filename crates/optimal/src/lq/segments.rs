@@ -25,7 +25,7 @@ use super::feedback::KnotFeedback;
 use super::forms::Sizes;
 use super::knot::LqKnot;
 use super::step::{Step, SweepError, SweepOptions};
-use condyle_linalg::{SLACK, max_abs, threads};
+use condyle_linalg::{max_abs, padded, threads};
 use core::ops::Range;
 
 /// Largest accepted difference of two value functions at a cut, relative to the largest entry. The sweep of the segment
@@ -139,7 +139,7 @@ impl Value {
         let n = Vx.len();
         let near = |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= CONSISTENT * scale);
         let (matrix, vector) = (max_abs(Vxx), max_abs(Vx));
-        let columns = self.P.chunks_exact(n + SLACK).zip(Vxx.chunks_exact(n));
+        let columns = self.P.chunks_exact(padded(n)).zip(Vxx.chunks_exact(n));
         columns.into_iter().all(|(a, b)| near(a, b, matrix)) && near(&self.p, Vx, vector)
     }
 }

@@ -145,6 +145,7 @@ impl Step {
         let Self { work, forms, hessians, scaled_rows, .. } = self;
         let SweepOptions { regularisation, defers_gains, rows, output, .. } = *options;
         let form = forms.of_step(knot, regularisation);
+        work.curve(knot.f.as_slice(), feedback.curved_gap.as_mut_slice());
         work.move_by(knot.f.as_slice());
         let ask = options.curvature.as_mut().map(|ask| &mut **ask as &mut CurvatureFn<'_>);
         form.write(work, knot, regularisation, &mut Curvature { knot: t, ask, hessians });

@@ -1,7 +1,7 @@
 //! Structure of a knot's dynamics that makes a sweep faster: blocks of A and B, or equations that replace A and B.
 #![allow(non_snake_case)] // names follow the literature: A, B, T, E
 
-use condyle_linalg::{SLACK, SparseRows};
+use condyle_linalg::{SparseRows, padded};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -113,8 +113,10 @@ pub(crate) struct InverseDynamicsForm {
     pub(crate) own: Vec<[usize; 3]>,
     /// Coordinates whose accelerations are not unknowns, in ascending order.
     pub(crate) dependent: Vec<usize>,
-    /// Matrix U of δu = U (w, δv, δq). Its zero masks are not written, because not every form reads them.
+    /// Matrix U of δu = U (w, δv, δq).
     pub(crate) efforts: SparseRows,
+    /// Whether the masks of U are written. The form of small arms does not read them.
+    pub(crate) has_masks: bool,
     /// Matrix D of the equations for dependent coordinates, one row for each.
     pub(crate) steps: SparseRows,
     /// Matrix G: its rows are the gradients of residuals that depend on more than δq.
@@ -129,7 +131,7 @@ impl InverseDynamicsForm {
     /// Allocates the form for a knot of nv coordinates and nu controls. `dependent` and `costs` are the maximum numbers
     /// of dependent coordinates and of residual rows.
     pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
-        self.stride = nu + 2 * nv + SLACK;
+        self.stride = padded(nu + 2 * nv);
         self.own.reserve(nv);
         self.dependent.reserve(dependent);
         self.slopes.reserve(costs);
@@ -154,12 +156,11 @@ impl InverseDynamicsForm {
         *self = Self { costs, slopes, diagonal, ..lent };
     }
 
-    /// Copies G, and the derivatives of the cost with respect to its residuals.
+    /// Copies G, whose rows are padded with zeros up to the stride, and the derivatives of the cost with respect to its
+    /// residuals.
     pub(crate) fn set_costs(&mut self, rows: &[f64], slopes: &[[f64; 2]]) {
         self.costs.resize(slopes.len(), self.stride);
-        for (to, from) in self.costs.numbers.chunks_exact_mut(self.stride).zip(rows.chunks_exact(self.stride)) {
-            to[..self.stride - SLACK].copy_from_slice(&from[..self.stride - SLACK]);
-        }
+        self.costs.numbers.copy_from_slice(rows);
         self.slopes.clear();
         self.slopes.extend_from_slice(slopes);
         self.costs.mark(self.stride);

@@ -3,6 +3,7 @@
 use super::outputs::{Capabilities, Output};
 use super::residuals::layout::ResidualData;
 use super::residuals::rows::Row;
+use condyle_linalg::Aligned;
 use condyle_spatial::block::{Block, Strided, lanes, scatter_matrix, scatter_rows};
 use nalgebra::DMatrix;
 
@@ -30,7 +31,7 @@ pub(crate) struct KnotData {
     pub dcontact_acceleration: [DMatrix<f64>; 3],
     /// Derivatives of the equations of motion, row after row, in the layout of a
     /// [`Tableau`](super::dynamics::kkt_elimination::Tableau).
-    pub equations: Vec<f64>,
+    pub equations: Aligned,
     /// Number of eliminations that are already done in `equations`. The eliminations are, in order, of the limbs and of
     /// the base.
     pub eliminations: usize,
@@ -59,7 +60,7 @@ impl KnotData {
             dtau: [(); 3].map(|()| DMatrix::zeros(n, n)),
             contact_acceleration: vec![0.0; controlled],
             dcontact_acceleration: [(); 3].map(|()| DMatrix::zeros(controlled, nv)),
-            equations: Vec::new(),
+            equations: Aligned::default(),
             eliminations: 0,
             steps: Vec::new(),
             residuals: ResidualData::default(),

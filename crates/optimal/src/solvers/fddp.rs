@@ -81,6 +81,13 @@ impl Fddp {
         Self { settings: Settings::default(), solver: SolverLoop::new(problem) }
     }
 
+    /// Returns the number of bytes that the sweep of the last iteration read from the knots: the mean of all knots
+    /// before the terminal one. Benchmarks print this number.
+    #[doc(hidden)]
+    pub fn bytes_per_knot(&self) -> usize {
+        self.solver.bytes_per_knot()
+    }
+
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat.
     ///
     /// # Errors

@@ -222,14 +222,20 @@ impl LineSearch {
     fn expect(&mut self, around: &Surroundings<'_>) {
         let Surroundings { iterate, merit, feedback, settings, .. } = around;
         let ((mut dg, mut dq), counts_gaps) = ((0.0, 0.0), settings.counts_gaps(merit.feasible));
-        for (t, feedback) in feedback.iter().enumerate() {
+        let all = feedback;
+        for (t, feedback) in all.iter().enumerate() {
             dg -= feedback.expected[0];
             dq -= feedback.expected[1];
             if counts_gaps {
                 let range = iterate.solution.shape().dx(t);
                 let (f, curved) = (&iterate.gaps[range.clone()], &mut self.curved_gaps[range]);
-                curved.fill(0.0);
-                add_scaled_product(curved, 1.0, View::new(feedback.Vxx.as_slice(), f.len()), f); // Vxx f
+                match t {
+                    0 => {
+                        curved.fill(0.0);
+                        add_scaled_product(curved, 1.0, View::new(feedback.Vxx.as_slice(), f.len()), f); // Vxx f
+                    }
+                    _ => curved.copy_from_slice(all[t - 1].curved_gap.as_slice()),
+                }
                 let curvature = dot(f, curved);
                 dg -= dot(feedback.Vx.as_slice(), f) + curvature;
                 dq += curvature;

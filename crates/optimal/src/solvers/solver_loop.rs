@@ -126,6 +126,12 @@ impl SolverLoop {
         }
     }
 
+    /// Returns the mean number of bytes that a sweep reads from a knot before the terminal one.
+    pub(super) fn bytes_per_knot(&self) -> usize {
+        let horizon = self.knots.len() - 1;
+        self.knots[..horizon].iter().map(LqKnot::bytes).sum::<usize>() / horizon.max(1)
+    }
+
     /// Begins an attempt to solve `problem`, from a warm start if one is given, else from the last trajectory.
     ///
     /// # Errors
@@ -356,7 +362,7 @@ impl SolverLoop {
         watch: &mut Watch<'_>,
     ) -> Result<(), Status> {
         let Merit { feasible, .. } = now.merit;
-        self.sweep.keep_values(settings.counts_gaps(feasible));
+        self.sweep.keep_values(false);
         let mut swept = None;
         if is_new {
             let phases = [Phase::CalcDiff, Phase::Sweep];

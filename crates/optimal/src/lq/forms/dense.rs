@@ -6,7 +6,7 @@ use super::super::knot::{Hessian, LqKnot};
 use super::super::workspace::Workspace;
 use super::controls::Controls;
 use super::{Curvature, KnotForm};
-use condyle_linalg::{SLACK, View, add_product_lower, copy_lower, copy_matrix, product, transpose};
+use condyle_linalg::{View, add_product_lower, copy_lower, copy_matrix, padded, product, transpose};
 
 /// Form with full matrices A and B, and with the states in their original order.
 #[derive(Debug, Clone)]
@@ -35,7 +35,7 @@ impl KnotForm for Dense {
         transpose(F, ld, View::new(knot.B.as_slice(), n), [n, m]);
         transpose(&mut F[m..], ld, View::new(knot.A.as_slice(), n), [n, n]);
         let F = View::new(F, ld);
-        product(W, ld, [rows, n, n], F, View::new(P, n + SLACK));
+        product(W, ld, [rows, n, n], F, View::new(P, padded(n)));
         for k in 0..n {
             W[k * ld + rows] = p[k];
         }
@@ -48,7 +48,7 @@ impl KnotForm for Dense {
         let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
         let Workspace { F, H, .. } = work;
-        product(&mut H[m + n + 1..], ld, [n, m + n, n], View::new(Theta, n + SLACK), View::new(F, ld));
+        product(&mut H[m + n + 1..], ld, [n, m + n, n], View::new(Theta, padded(n)), View::new(F, ld));
     }
 
     fn eliminate(

@@ -20,8 +20,8 @@ use super::super::structure::InverseDynamicsForm;
 use super::super::workspace::Workspace;
 use super::{Curvature, KnotForm};
 use condyle_linalg::{
-    SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_narrow_level, copy_scaled, eliminate_sum,
-    transpose_block,
+    Aligned, SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_narrow_level, copy_scaled, eliminate_sum,
+    padded, transpose_block,
 };
 
 /// Maximum number of coordinates. For more coordinates, the form that skips zeros in the rows is faster.
@@ -34,7 +34,7 @@ const MOST_COSTS: usize = 16;
 pub(in crate::lq) struct Driven {
     /// Scaled rows of U and G with columns for (w, δv, δq). Each row ends with its entry of the gradient and with
     /// zeros. Shape: `stride` × (MOST + MOST_COSTS); empty for larger robots.
-    rows: Vec<f64>,
+    rows: Aligned,
     stride: usize,
     /// Number of rows in use in `rows`.
     count: usize,
@@ -46,8 +46,8 @@ impl Driven {
     /// Allocates the scratch for n states.
     pub(super) fn new(n: usize) -> Self {
         let nv = if n <= 2 * MOST { n / 2 } else { 0 };
-        let stride = 4 * nv + 1 + 4 * SLACK;
-        Self { rows: vec![0.0; stride * (nv + MOST_COSTS)], stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
+        let stride = padded(4 * nv + 1 + 3 * SLACK);
+        Self { rows: Aligned::zeros(stride * (nv + MOST_COSTS)), stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
     }
 
     /// Returns the number of rows that this form needs below H.
@@ -117,7 +117,7 @@ impl Vectorized for Write<'_> {
         let (n, all, size) = (2 * nv, 3 * nv, form.stride);
         let (dt, _) = knot.structure.euler().expect("the form is that of Euler steps");
         let Workspace { P, p, H, .. } = work;
-        let (P, Q) = (View::new(P, n + SLACK), View::new(knot.Q.as_slice(), n));
+        let (P, Q) = (View::new(P, padded(n)), View::new(knot.Q.as_slice(), n));
         let (v, q) = (nv * ld, n * ld); // offsets of the columns of δv and δq in H
 
         // writes Nᵀ = Δt P₁₁ + P₁₂, Π = Δt (Nᵀ + P₂₁) + P₂₂, and Q + P₁₁ in the block of δq

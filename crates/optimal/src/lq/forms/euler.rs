@@ -10,8 +10,8 @@ use super::controls::Controls;
 use super::dense::{add_to_diagonal, write_cost};
 use super::{Curvature, KnotForm};
 use condyle_linalg::{
-    SLACK, Vector, Vectorized, View, add_in_turn, add_matrix, add_product_lower, add_transposed_product_lower,
-    at_narrow_level, product, transpose,
+    Aligned, Vector, Vectorized, View, add_in_turn, add_matrix, add_product_lower, add_transposed_product_lower,
+    at_narrow_level, padded, product, transpose,
 };
 
 /// Form of semi-implicit Euler steps with the controls as unknowns, and with the states in the order (v, q).
@@ -19,14 +19,14 @@ use condyle_linalg::{
 pub(super) struct Euler {
     steps: Steps,
     /// Scratch for the upper triangle of NᵀF_q, with the same stride as Nᵀ and Π.
-    M: Vec<f64>,
+    M: Aligned,
     controls: Controls,
 }
 
 impl Euler {
     /// Allocates the scratch for n states and at most m controls.
     pub(super) fn new(n: usize, m: usize) -> Self {
-        Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)], controls: Controls::new(m) }
+        Self { steps: Steps::new(n), M: Aligned::zeros(padded(n / 2) * (n / 2)), controls: Controls::new(m) }
     }
 }
 
@@ -44,7 +44,7 @@ impl KnotForm for Euler {
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>) {
         let (n, m) = (knot.ndx(), knot.nu());
         let (nv, ld, rows) = (n / 2, work.stride(m), m + n);
-        let ldn = nv + SLACK;
+        let ldn = padded(nv);
         let Self { steps, M, .. } = self;
         write_cost(work, knot, nv, curvature);
         steps.write(work, knot);
@@ -75,7 +75,7 @@ impl KnotForm for Euler {
         let ld = work.stride(m);
         self.steps.write_velocities_below(work, knot, Theta);
         let Workspace { F, W: Psi, H, .. } = work;
-        product(&mut H[m + n + 1..], ld, [n, m + n, n / 2], View::new(Psi, n + SLACK), View::new(F, ld));
+        product(&mut H[m + n + 1..], ld, [n, m + n, n / 2], View::new(Psi, padded(n)), View::new(F, ld));
         self.steps.add_positions_below(work, knot, Theta);
     }
 
@@ -95,22 +95,22 @@ impl KnotForm for Euler {
 }
 
 /// Value function of the next state, written with the change y of the next velocity and the change δq of the positions
-/// as variables. Matrices are column-major with padding rows and the stride nv + SLACK.
+/// as variables. Matrices are column-major with padding rows and the stride `padded(nv)`.
 #[derive(Debug, Clone)]
 pub(super) struct Steps {
     /// Matrices Nᵀ and Π, one after the other in one buffer.
-    both: Vec<f64>,
+    both: Aligned,
     /// Gradient with respect to y: Δt Eᵀp_q + p_v.
     pub(super) py: Vec<f64>,
     /// Products P E or P T, computed only in the columns of blocks; with the stride of P.
-    PB: Vec<f64>,
+    PB: Aligned,
 }
 
 impl Steps {
     /// Allocates the matrices for n states.
     pub(super) fn new(n: usize) -> Self {
-        let matrix = |rows: usize| vec![0.0; (rows + SLACK) * (n / 2)];
-        Self { both: matrix(n / 2).repeat(2), py: vec![0.0; n / 2], PB: matrix(n) }
+        let matrix = |rows: usize, count: usize| Aligned::zeros(count * padded(rows) * (n / 2));
+        Self { both: matrix(n / 2, 2), py: vec![0.0; n / 2], PB: matrix(n, 1) }
     }
 
     /// Returns Nᵀ and Π.
@@ -123,7 +123,7 @@ impl Steps {
     pub(super) fn write(&mut self, work: &Workspace, knot: &LqKnot) {
         let (dt, blocks) = steps_of(knot);
         let n = knot.ndx();
-        times_blocks(&mut self.PB, &work.P, n + SLACK, n, blocks, |block| &block.E);
+        times_blocks(&mut self.PB, &work.P, padded(n), n, blocks, |block| &block.E);
         at_narrow_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
     }
 
@@ -132,14 +132,14 @@ impl Steps {
         let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
         let (nv, ld) = (n / 2, work.stride(m));
         let Workspace { P, p, H, .. } = work;
-        times_blocks(&mut self.PB, P, n + SLACK, nv, blocks, |block| &block.T);
+        times_blocks(&mut self.PB, P, padded(n), nv, blocks, |block| &block.T);
         at_narrow_level(AddPositions { steps: self, P, p, H: &mut H[(m + nv) * (ld + 1)..], ld, blocks });
     }
 
     /// Computes Ψ = Δt Θ_q E + Θ_v into W, with the stride of Θ.
     pub(super) fn write_velocities_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let ((dt, blocks), n) = (steps_of(knot), knot.ndx());
-        let (nv, ld) = (n / 2, n + SLACK);
+        let (nv, ld) = (n / 2, padded(n));
         let (Self { PB, .. }, Psi) = (self, &mut work.W);
         times_blocks(PB, Theta, ld, n, blocks, |block| &block.E);
         for k in 0..nv {
@@ -154,7 +154,7 @@ impl Steps {
     /// Adds Θ_q T to the columns of δq, in the rows below H.
     pub(super) fn add_positions_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
-        let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
+        let (nv, ld, ldt, at) = (n / 2, work.stride(m), padded(n), m + n + 1);
         let (Self { PB, .. }, H) = (self, &mut work.H);
         times_blocks(PB, Theta, ldt, n, blocks, |block| &block.T);
         for j in 0..nv {
@@ -184,7 +184,7 @@ impl Vectorized for WriteSteps<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Self { steps: Steps { both, py, PB }, P, p, dt, blocks } = self;
-        let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
+        let (nv, ldp, ldn) = (p.len() / 2, padded(p.len()), padded(p.len() / 2));
 
         // writes Nᵀ = Tᵀ(Δt P₁₁E + P₁₂) and Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂, but without the left factors Tᵀ
         // and Eᵀ
@@ -197,8 +197,8 @@ impl Vectorized for WriteSteps<'_> {
         }
         let (N, Pi) = both.split_at_mut(nv * ldn);
         let (p_q, p_v) = p.split_at(nv);
-        for ((y, q), v) in py.iter_mut().zip(p_q).zip(p_v) {
-            *y = dt * q + v;
+        for k in 0..nv {
+            py[k] = dt * p_q[k] + p_v[k];
         }
         // applies the left factors Tᵀ and Eᵀ, block by block
         for block in blocks {
@@ -231,13 +231,15 @@ impl Vectorized for AddPositions<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
         let Self { steps: Steps { PB, .. }, P, p, H, ld, blocks } = self;
-        let (nv, ldp) = (p.len() / 2, p.len() + SLACK);
+        let (nv, ldp) = (p.len() / 2, padded(p.len()));
         let whole = nv.next_multiple_of(V::N);
         for j in 0..nv {
             let (PT, H) = (&column(j, blocks, P, PB, ldp)[..whole], &mut H[j * ld..][..whole.max(nv + 1)]);
             let gradient = H[nv];
-            for (H, PT) in H.chunks_exact_mut(V::N).zip(PT.chunks_exact(V::N)) {
-                V::load(H).add(V::load(PT)).store(H); // elements above the diagonal are never read
+            let mut i = j / V::N * V::N; // elements above the diagonal are never read
+            while i < whole {
+                V::load(&H[i..]).add(V::load(&PT[i..])).store(&mut H[i..]);
+                i += V::N;
             }
             H[nv] = gradient + p[j];
         }
@@ -310,9 +312,10 @@ fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLO
 #[inline(always)]
 fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
     let mut sums = [V::splat(0.0); 4];
-    for (row, x) in rows.iter().zip(x) {
+    for k in 0..x.len().min(LARGEST_BLOCK) {
+        let (row, x) = (&rows[k], V::splat(x[k]));
         for s in 0..8 / V::N {
-            sums[s] = V::load(&row[s * V::N..]).mul_add(V::splat(*x), sums[s]);
+            sums[s] = V::load(&row[s * V::N..]).mul_add(x, sums[s]);
         }
     }
     sums

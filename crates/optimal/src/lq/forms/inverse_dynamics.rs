@@ -33,7 +33,7 @@ use super::euler::Steps;
 use super::{Curvature, KnotForm};
 use condyle_linalg::{
     OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_narrow_level, copy_block, copy_matrix, copy_scaled,
-    eliminate, mask,
+    eliminate, mask, padded,
 };
 
 /// Form of a knot as equations of inverse dynamics, with its scratch.
@@ -67,7 +67,7 @@ impl InverseDynamics {
             products: OuterProducts::with_capacity(numbers, products),
             half: Vec::with_capacity((dependent + SLACK) * dependent),
             gains: Gains::new(n, m),
-            below: Vec::with_capacity((n + SLACK) * dependent),
+            below: Vec::with_capacity(padded(n) * dependent),
         }
     }
 }
@@ -109,7 +109,7 @@ impl KnotForm for InverseDynamics {
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m, InverseDynamicsForm { own, dependent, steps: D, stride, .. }) =
             (knot.ndx(), knot.nu(), &knot.inverse_dynamics);
-        let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
+        let (nv, ld, ldt, at) = (n / 2, work.stride(m), padded(n), m + n + 1);
         self.steps.write_velocities_below(work, knot, Theta);
         let (Self { steps, below, .. }, Workspace { W: Psi, H, .. }) = (self, &mut *work);
         for k in (0..m).chain(m + nv..m + n) {
@@ -166,7 +166,7 @@ impl Vectorized for WriteRows<'_> {
         let ((N, Pi), py) = (steps.N_and_Pi(), steps.py.as_slice());
         let (n, m, imp) = (knot.ndx(), knot.nu(), &knot.inverse_dynamics);
         let (nv, all, size) = (n / 2, m + n, imp.stride);
-        let ldn = nv + SLACK;
+        let ldn = padded(nv);
 
         // copies Π and N for the unknowns and δv; unknowns with index `forces` or above are forces
         let forces = imp.own.last().map_or(0, |own| own[1] + own[2]);
@@ -203,7 +203,8 @@ impl Vectorized for WriteRows<'_> {
         // appends the rows of Uᵀ (R + ϱ 1) U and Gᵀ a″ G
         products.clear(all, size);
         for (k, row) in imp.efforts.numbers.chunks_exact(size).enumerate() {
-            products.square::<V>(row, mask(row), [knot.r[k], imp.diagonal[nv + k] + regularisation]);
+            let mask = if imp.has_masks { imp.efforts.masks[k] } else { mask(row) };
+            products.square::<V>(row, mask, [knot.r[k], imp.diagonal[nv + k] + regularisation]);
         }
         for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
             products.square::<V>(row, mask, slopes);

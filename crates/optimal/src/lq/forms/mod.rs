@@ -31,7 +31,7 @@ pub(super) trait KnotForm {
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>);
 
     /// Writes a product to the rows below H, after `write` has been called. The product is Θ times the map from the
-    /// unknowns and δx to δx⁺. Θ has n rows (stride n + SLACK).
+    /// unknowns and δx to δx⁺. Θ has n rows (stride `padded(n)`).
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]);
 
     /// Eliminates the unknowns from H, which becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated

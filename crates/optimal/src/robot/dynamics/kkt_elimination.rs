@@ -293,7 +293,11 @@ impl Vectorized for Run<'_> {
         if e.pivots.contains(&usize::MAX) && !e.eliminate::<V>(T, motion) {
             return;
         }
-        if e.pivots != e.laid_out {
+        let mut is_laid_out = e.laid_out.len() == solved;
+        for r in 0..if is_laid_out { solved } else { 0 } {
+            is_laid_out &= e.pivots[r] == e.laid_out[r];
+        }
+        if !is_laid_out {
             e.lay_out();
         }
         let size = form.stride;
@@ -303,20 +307,27 @@ impl Vectorized for Run<'_> {
         form.own.clear();
         form.own.extend(e.runs[0].iter());
         form.efforts.resize(gather.m, size);
-        for (row, to) in motion.chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
-            gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
+        for k in 0..gather.m {
+            let to = &mut form.efforts.numbers[k * size..(k + 1) * size];
+            gather.row::<V>(&motion[k * stride..(k + 1) * stride], [1.0 / dt, 1.0, 1.0], to);
+        }
+        form.has_masks = solved > 0; // an arm without solved rows rarely needs masks
+        if form.has_masks {
+            form.efforts.mark(size); // while the rows are in the cache
         }
         form.dependent.clear();
         form.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
         form.steps.resize(form.dependent.len(), size);
         e.forces.resize(solved - form.dependent.len(), size);
-        let [mut steps, mut forces] = [&mut form.steps, &mut e.forces].map(|to| to.numbers.chunks_exact_mut(size));
-        for (row, &k) in T.chunks_exact(stride).zip(&e.pivots) {
-            let (to, by) = match k < nv {
-                true => (&mut steps, [-1.0, -dt, -dt]),
-                false => (&mut forces, [-1.0 / dt, -1.0, -1.0]),
+        let (mut steps, mut forces) = (0, 0); // numbers of rows that are written
+        for r in 0..solved {
+            let (to, count, by) = match e.pivots[r] < nv {
+                true => (&mut form.steps, &mut steps, [-1.0, -dt, -dt]),
+                false => (&mut e.forces, &mut forces, [-1.0 / dt, -1.0, -1.0]),
             };
-            gather.row::<V>(row, by, to.next().expect("a row for each pivot"));
+            let to = &mut to.numbers[*count * size..(*count + 1) * size];
+            gather.row::<V>(&T[r * stride..(r + 1) * stride], by, to);
+            *count += 1;
         }
         form.steps.mark(size);
         *done = true;

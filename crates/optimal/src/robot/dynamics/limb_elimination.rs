@@ -238,9 +238,10 @@ kernel! {
         for (r, row) in contacts.chunks_exact_mut(stride).enumerate() {
             copy_row(&mut row[..nv], J, r);
         }
-        for (row, column) in motion.chunks_exact_mut(stride).zip(J.as_slice().chunks_exact(rows.max(1))) {
-            for (to, from) in row[nv..][..rows].iter_mut().zip(column) {
-                *to = -*from;
+        for i in 0..nv {
+            let (row, column) = (&mut motion[i * stride + nv..][..rows], &J.as_slice()[i * rows..][..rows]);
+            for r in 0..rows {
+                row[r] = -column[r];
             }
         }
     }
@@ -249,8 +250,10 @@ kernel! {
 /// Copies row i of the matrix `from` to `to`.
 #[inline(always)]
 fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
-    for (to, column) in to.iter_mut().zip(from.as_slice().chunks_exact(from.nrows())) {
-        *to = column[i];
+    let (rows, from) = (from.nrows(), from.as_slice());
+    assert!(i < rows && to.len() * rows <= from.len(), "a row that does not exist");
+    for k in 0..to.len() {
+        to[k] = from[k * rows + i];
     }
 }
 
@@ -346,14 +349,21 @@ fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], i
     let (before, rest) = T.split_at_mut(rows.start * stride);
     let (own, after) = rest.split_at_mut(N * stride);
     let Y = Y.as_chunks_mut::<N>().0;
-    for (c, y) in columns.iter().flat_map(Range::clone).zip(&mut *Y) {
-        let x: [S; N] = core::array::from_fn(|k| own[k * stride + c]);
-        for i in 0..N {
-            let mut sum = inverse[i * N] * x[0];
-            for k in 1..N {
-                sum = inverse[i * N + k].mul_add(x[k], sum);
+    let mut at = 0;
+    for run in columns {
+        for c in run.start..run.end {
+            let (mut x, y) = ([S::zero(); N], &mut Y[at]);
+            for k in 0..N {
+                x[k] = own[k * stride + c];
             }
-            (own[i * stride + c], y[i]) = (sum, sum); // Y = B⁻¹ J
+            for i in 0..N {
+                let mut sum = inverse[i * N] * x[0];
+                for k in 1..N {
+                    sum = inverse[i * N + k].mul_add(x[k], sum);
+                }
+                (own[i * stride + c], y[i]) = (sum, sum); // Y = B⁻¹ J
+            }
+            at += 1;
         }
     }
     for (i, row) in own.chunks_exact_mut(stride).enumerate() {
@@ -366,15 +376,19 @@ fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], i
             true => &mut before[i * stride..][..stride],
             false => &mut after[(i - rows.end) * stride..][..stride],
         };
-        let (g, mut Y): ([S; N], _) = (core::array::from_fn(|k| -row[solved[k]]), &*Y);
+        let (mut g, mut Y) = ([S::zero(); N], &*Y);
+        for k in 0..N {
+            g[k] = -row[solved[k]];
+        }
         for run in columns {
             let (some, rest) = Y.split_at(run.len());
-            for (x, y) in row[run.clone()].iter_mut().zip(some) {
-                let mut sum = *x;
+            let row = &mut row[run.clone()];
+            for j in 0..some.len() {
+                let mut sum = row[j];
                 for k in 0..N {
-                    sum = g[k].mul_add(y[k], sum);
+                    sum = g[k].mul_add(some[j][k], sum);
                 }
-                *x = sum; // M_i − M_il Y
+                row[j] = sum; // M_i − M_il Y
             }
             Y = rest;
         }

@@ -26,6 +26,7 @@ use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics,
     gravity, integrate, integrate_jacobian_groups, neutral,
 };
+use condyle_linalg::Aligned;
 use condyle_spatial::Scalar;
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -113,7 +114,7 @@ impl VectorBatches {
 
     /// Returns the equations of a knot at a posture at which the limbs can be eliminated. Returns `None` if the search
     /// finds no such posture.
-    fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Vec<f64>> {
+    fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Aligned> {
         (0..POSTURES).find_map(|posture| {
             let bend: Vec<f64> = (0..model.nv()).map(|k| 0.5 * ((1 + posture + k) as f64).sin()).collect();
             let (mut at, mut x) = (at.clone(), vec![0.0; model.nq() + model.nv()]);
@@ -156,7 +157,7 @@ impl Work {
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
             let damped = matches!(kind, DynamicsKind::Contact(_, damping) if *damping != 0.0);
             let tableau = Tableau { nv, rows: capabilities.rows() };
-            data.equations.resize(tableau.len(), 0.0);
+            data.equations.resize(tableau.len());
             let mut elimination = KktElimination::new(nv, passive, &moved_by);
             let eliminations = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
                 elimination.follow(vec![limbs.solved()]);

@@ -3,7 +3,7 @@
 #![allow(non_snake_case)] // names follow the literature
 
 use crate::lq::LqKnot;
-use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product_without_slack};
+use condyle_linalg::{Aligned, Vector, Vectorized, View, at_level, padded, product_without_slack};
 use core::ops::Range;
 
 /// Adds d to q and diag(dd) to Q at `entries`, for a residual whose Jacobian there is the identity.
@@ -51,22 +51,22 @@ pub(crate) struct Rows {
     stride: usize,
     /// Buffer of rows, filled from both ends. Rows of residuals that depend on more than q begin at the front; rows of
     /// residuals that depend only on q begin at the back.
-    rows: Vec<f64>,
+    rows: Aligned,
     /// Derivatives a′ and a″ of the activation for each row.
     slopes: Vec<[f64; 2]>,
     /// Number of rows with respect to (u, v, q); the next field is the number of rows with respect to only q.
     whole: usize,
     positions: usize,
     /// Rows multiplied by √|a″|; the next field contains the same rows with the sign of a″.
-    left: Vec<f64>,
-    right: Vec<f64>,
+    left: Aligned,
+    right: Aligned,
 }
 
 impl Rows {
     /// Allocates `whole` rows with respect to (u, v, q) and `positions` rows with respect to only q.
     pub(crate) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
-        let (most, stride) = (whole + positions, nu + 2 * nv + SLACK);
-        let rows = vec![0.0; most.max(1) * stride];
+        let (most, stride) = (whole + positions, padded(nu + 2 * nv));
+        let rows = Aligned::zeros(most.max(1) * stride);
         let (left, right, slopes) = (rows.clone(), rows.clone(), vec![[0.0; 2]; most]);
         Self { nu, nv, stride, rows, slopes, whole: 0, positions: 0, left, right }
     }
@@ -156,7 +156,7 @@ impl Vectorized for Write<'_> {
         }
         let (u, v, q) = (0, m, m + nv); // offsets of u, v and q in a row
         let Q = knot.Q.as_mut_slice();
-        let both = [left.as_slice(), right.as_slice()];
+        let both = [&left[..], &right[..]];
         if inverse {
             knot.inverse_dynamics.diagonal.fill(0.0);
             for k in 0..if all == 0 { nv } else { 0 } {
@@ -185,8 +185,8 @@ impl Vectorized for Write<'_> {
 /// Computes y += a x for the entries of x.
 #[inline(always)]
 fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
-    for (y, x) in y.iter_mut().zip(x) {
-        *y += a * x;
+    for i in 0..y.len().min(x.len()) {
+        y[i] += a * x[i];
     }
 }
 
