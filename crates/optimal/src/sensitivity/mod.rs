@@ -54,7 +54,7 @@ use system::System;
 /// // x⁺ = x + u with the cost ½ (x² + u²): the first control is proportional to the initial state.
 /// # let (mut knot, mut end) = (LqKnot::zeros(1, 1), LqKnot::zeros(1, 0));
 /// # (knot.A[0], knot.B[0], knot.Q[0], knot.R[0], end.Q[0]) = (1.0, 1.0, 1.0, 1.0, 1.0);
-/// # let (knot, end) = (Lqr::new(knot)?, Lqr::new(end)?);
+/// # let (knot, end) = (Lqr::new(knot), Lqr::new(end));
 /// let mut problem = Problem::new(vec![1.0], vec![Box::new(knot)], vec![0; 30], Box::new(end))?;
 /// let solution = Fddp::new(&problem).solve(&mut problem, &[0.0; 31], &[0.0; 30])?.clone();
 /// let mut sensitivity = Sensitivity::new(&mut problem, &solution, None, SensitivitySettings::default())?;
