@@ -64,6 +64,7 @@ mod integrators;
 mod knot_data;
 mod limits;
 mod motion;
+mod obstacles;
 mod outputs;
 mod own_constraint;
 mod problem;
