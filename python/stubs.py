@@ -89,13 +89,15 @@ ARGUMENTS = {
         q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort
         Plan.controls corners durations normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
-        InteriorPoint.set_multipliers.values Problem.set_references.values rollout_many.us
+        InteriorPoint.set_multipliers.values Problem.set_references.values Problem.set_placements.placements
+        rollout_many.us
         Problem.set_contact.kp Problem.set_entry_weights.weights ControlRate.weights by_xs""",
     "float | ArrayLike": "Problem.set_weight.weight",
     'Literal["full_step"]': "stop",
     "int | None": "_casadi_hold_knot.t",
     "ArrayLike | None": """
-        _DifferentialIk._step.v0 Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement""",
+        _DifferentialIk._step.v0 _DifferentialIk._place.velocity Model.append.placement
+        ModelBuilder.append.placement ModelBuilder.merge.placement""",
     "Model": "model",
     "Data": "data",
     "_SpelledModel": " ".join(f"{name}.model" for name in ("_SpelledData", *SPELLED)),
@@ -107,7 +109,7 @@ ARGUMENTS = {
     "Force": "_SpelledData._leave.hg",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "tuple[str, float, float, float] | None": "_DifferentialIk.distances",
+    "tuple[str, float, float, float, float] | None": "_DifferentialIk.distances",
     "list[float]": "_DifferentialIk._converge.tolerance _GlobalIk.tolerance",
     "str": """
         _DifferentialIk._describe.kind _GlobalIk._describe.kind _GlobalIk.rank _GlobalIk.pairs
@@ -130,7 +132,7 @@ ARGUMENTS = {
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states
         Record.__getitem__.key""",
     "float": """
-        _GlobalIk.orientation_weight _GlobalIk.minimum
+        _GlobalIk.orientation_weight _GlobalIk.minimum Residual.distances.within
         ArmMpc.clearance ArmMpc.knot WholeBodyMpc.knot
         Foot.point.friction Foot.sole.friction ArmMpc.horizon ArmMpc.latency Foot.point.radius Gait.bound.swing
         Gait.bound.double Gait.pace.swing Gait.pace.double Gait.step.swing Gait.step.double Gait.table.period

@@ -32,6 +32,7 @@ from pink.limits import ConfigurationLimit, VelocityLimit
 from pink.tasks import ComTask, DampingTask, FrameTask, PostureTask
 
 import condyle
+from condyle import wholebody
 from condyle.distances import Geometry, Shape
 from condyle.ik import DifferentialIk, DistanceLimits, GlobalIk, Task
 
@@ -141,6 +142,22 @@ def step(name: str, urdf: Path, frames: list[str], floating: bool) -> dict[str, 
     return found
 
 
+def two_solvers() -> dict[str, float]:
+    """Times the same tasks of an arm as a step with limits that hold it, and as a tick of whole-body control."""
+    arm, q = condyle.robots.arm7(), np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0])
+    ik = DifferentialIk(arm, [Task.pose("tool"), Task.posture()])
+    tasks = [wholebody.Task.pose("tool"), wholebody.Task.posture()]
+    controller = wholebody.WholeBodyController(arm, [], tasks)
+    targets, references = ik.hold(q), controller.hold(q)
+    targets.frames[0, :3, 3] += [0.0, 0.2, 0.1]
+    references.frames[0].pose = targets.frames[0]
+    return {
+        "step_us": 1e6 * median_time(lambda: ik.step(q, targets), 2000),
+        "tick_us": 1e6 * median_time(lambda: controller.step(q, np.zeros(7), references), 2000),
+        "active_limits": len(ik.step(q, targets).held),
+    }
+
+
 def self_pairs() -> list[tuple[Geometry, Geometry]]:
     """Returns pairs of spheres on the links of a Panda that are not neighbours."""
     balls = [Geometry(Shape.sphere([0.0, 0.0, 0.0], 0.07), link, name=link) for link in LINKS]
@@ -245,6 +262,7 @@ def main() -> None:
     found = {
         "panda step": step("panda", panda, ["panda_hand_tcp"], False),
         "g1 step": step("g1", g1, [*feet_and_hands, "torso_link"], True),
+        "two solvers": two_solvers(),
         "panda targets": targets_of_panda(panda, arguments.targets),
     }
     if arguments.json:

@@ -1741,7 +1741,7 @@ class _DifferentialIk:
         dt: float,
         damping: float,
         limits: Any,
-        distances: tuple[str, float, float, float] | None,
+        distances: tuple[str, float, float, float, float] | None,
     ) -> _DifferentialIk: ...
     def _converge(
         self, q: ArrayLike, frames: ArrayLike, com: ArrayLike, posture: ArrayLike, tolerance: list[float], steps: int
@@ -1757,8 +1757,8 @@ class _DifferentialIk:
     def _nearest(self) -> tuple[int, float] | None:
         """Returns the nearest pair before the last step, and its distance."""
 
-    def _place(self, name: str, placement: ArrayLike) -> bool:
-        """Sets the placement of the geometry with a name; returns whether it exists."""
+    def _place(self, name: str, placement: ArrayLike, velocity: ArrayLike | None) -> bool:
+        """Sets placement and velocity of the geometry with a name; returns whether it exists."""
 
     def _step(
         self, q: ArrayLike, v0: ArrayLike | None, frames: ArrayLike, com: ArrayLike, posture: ArrayLike
@@ -2861,6 +2861,17 @@ class ArmMpc:
 
     def policy(self) -> JointPolicy:
         """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
+
+    def place(self, name: str, placement: ArrayLike, velocity: ArrayLike | None = None, t: float = 0.0) -> None:
+        """Sets the placement of an obstacle and its velocity. Later ticks plan with its motion at constant velocity. A
+        call for each measurement of the obstacle corrects the motion.
+
+        name: the name of the `Geometry` in `obstacles`; placement: its pose (4, 4) in the world at the time t (s).
+        velocity: [linear, angular], six numbers along the world's axes: the velocity of the origin of the placement
+            (m/s), and the angular velocity (rad/s); None for an obstacle at rest.
+
+        Raises `ControllerError` if no pair has this obstacle, or for a number that is not finite.
+        """
 
     def reset(self, x: ArrayLike, path: ArrayLike | Callable[[float], ArrayLike], t: float = 0.0) -> None:
         """Begins anew in a state, whose joints are the posture from which the arm deviates as little as the path allows.
@@ -4557,6 +4568,18 @@ class Problem:
         new duration of an action that does not belong to a robot. Then nothing changes.
         """
 
+    def set_placements(self, name: str, placements: ArrayLike) -> None:
+        """Sets the placements of a geometry in `Residual.distances`, in costs and limits, at all knots: for example of an
+        obstacle that moves while the plan is executed. Call this method between solves.
+
+        name: the name of the `Geometry`.
+        placements: the poses (N + 1, 4, 4) in the world, or in the frame of the geometry, at the knots 0 … N.
+
+        Knots with this geometry get separate costs and limits, which move with the knot in `shift`.
+
+        Raises `KeyError` if no pair has this geometry, and `ProblemError` for a placement that is no pose.
+        """
+
     def set_references(self, name: str, values: ArrayLike) -> None:
         """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
         each period, between solves.
@@ -4719,12 +4742,17 @@ class Residual:
         """
 
     @staticmethod
-    def distances(model: Model, pairs: Sequence[tuple[Sphere | Geometry, Sphere | Geometry]]) -> Residual:
+    def distances(
+        model: Model, pairs: Sequence[tuple[Sphere | Geometry, Sphere | Geometry]], within: float | None = None
+    ) -> Residual:
         """Returns the signed distances between pairs of geometries, r = n·(p₁ − p₂) with the nearest points p₁ and p₂ and
         the unit normal n, one number for each pair (m). A distance is negative while the geometries overlap.
 
         pairs: a list of pairs of `Sphere`s or `condyle.distances.Geometry`s. At least one geometry of a pair is fixed
             to a frame of the robot; the other one is fixed to the world, or to a frame of the same robot.
+
+        within: a range r (m), above 0, or None for none: an entry is min(d, r). Pairs that are farther away cost
+            little, and have no derivatives. Give a range well above the bounds and the margin of an activation.
 
         A `Limit` or a `Cost` of this residual keeps the geometries apart: if no bounds or activation are given, all
         distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
@@ -5825,6 +5853,19 @@ class WholeBodyController:
 
         q: position, nq numbers; v: velocity, nv numbers.
         references: `References` of this controller.
+        """
+
+    def place(self, name: str, placement: ArrayLike, velocity: ArrayLike | None = None) -> None:
+        """Sets the placement of the geometry with a name in the pairs of `DistanceLimits`, for example of an obstacle
+        that moves.
+
+        name: the name of the `Geometry`.
+        placement: the pose (4, 4) in the world, or in the frame of the geometry.
+        velocity: the velocity of an obstacle in the world, [linear, angular], six numbers along the world's axes: the
+            velocity of the origin of its placement (m/s), and its angular velocity (rad/s); None for an obstacle at
+            rest.
+
+        Raises `ValueError` if no geometry has this name, or if a number is not finite.
         """
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:

@@ -874,6 +874,8 @@ class Violation(NamedTuple):
     """The index of the row in the limit `name`; without a name, the same number as `row`."""
     amount: float
     """The distance from the bound, or the magnitude of the gap; infinite if this number is NaN."""
+    what: str | None = None
+    """The two geometries of a limit of distances; None for other rows."""
 
 
 class SensitivityReport(NamedTuple):

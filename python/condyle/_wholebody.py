@@ -2,7 +2,7 @@
 array.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias, overload
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._condyle import ControllerError, _check_pose, _check_rotations
 
 if TYPE_CHECKING:
-    from .distances import GeometryPair
+    from .distances import DistanceLimits
 
 _Array: TypeAlias = NDArray[np.float64]
 _Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # for each rotation: joint, and range in q
@@ -70,27 +70,6 @@ class JointLimits(NamedTuple):
     """Maximum speed (rad/s, m/s), nv numbers; None for the model's limits."""
 
 
-class DistanceLimits(NamedTuple):
-    """Limits of the distances d of pairs of geometries, as bounds on d̈ over a look-ahead time T:
-
-        d̈ = g q̈ + ġ v ≥ −(2 / T) ḋ − (d − d_min) / T²,   g = ∂d/∂q
-
-    The bound is at most a_max, so a pair that is too near moves apart with at most a_max. If dynamics, contacts and
-    torques leave no solution within the bounds, the bounds become tasks of large weight at this tick.
-    """
-
-    pairs: "Sequence[GeometryPair]"
-    """The pairs of geometries, of `condyle.distances`."""
-    minimum: float = 0.01
-    """The minimum distance d_min (m)."""
-    look_ahead: float = 0.1
-    """The look-ahead time T (s), which should be at least some ticks."""
-    max_acceleration: float = 50.0
-    """The maximum acceleration a_max (m/s²)."""
-    range: float = 0.2
-    """The distance above d_min beyond which a pair has no limit (m)."""
-
-
 class Settings(NamedTuple):
     """The settings of a `WholeBodyController`.
 
@@ -142,7 +121,7 @@ class Settings(NamedTuple):
     """The time after which a step fails (s). If a step reaches this limit, its result depends on the load of the
     machine.
     """
-    distances: DistanceLimits | None = None
+    distances: "DistanceLimits | None" = None
     """The limits of distances between bodies and obstacles; None for no limits."""
 
 

@@ -30,7 +30,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._condyle import Data, Model, _Collisions, _DistancePairs
 
-__all__ = ["Collisions", "DistancePairs", "Distances", "Geometry", "GeometryPair", "Shape", "distances"]
+__all__ = [
+    "Collisions",
+    "DistanceLimits",
+    "DistancePairs",
+    "Distances",
+    "Geometry",
+    "GeometryPair",
+    "Shape",
+    "distances",
+]
 
 
 def _three(name: str, value: ArrayLike) -> list[float]:
@@ -151,6 +160,8 @@ def _geometry(model: Model, geometry: Geometry) -> dict[str, Any]:
         if pose.shape != (4, 4):
             raise ValueError(f"placement: expected shape (4, 4), found {pose.shape}")
         _finite("placement", pose.ravel())
+        if not np.allclose(pose[3], [0.0, 0.0, 0.0, 1.0], rtol=0.0, atol=1e-9):
+            raise ValueError(f"placement: expected the last row (0, 0, 0, 1), found {pose[3].tolist()}")
         columns = {axis: _vector([float(x) for x in pose[:3, k]]) for k, axis in enumerate("xyz")}
         found["placement"] = {"rotation": columns, "translation": _vector([float(x) for x in pose[:3, 3]])}
     return found
@@ -227,6 +238,32 @@ class DistancePairs:
         if index is None:
             raise ValueError(f"name: no geometry is named {name!r}")
         self._prepared._place(index, placement)
+
+
+class DistanceLimits(NamedTuple):
+    """Limits of the distances d of pairs of geometries, which approach a minimum over a look-ahead time T. Inverse
+    kinematics limits the rate of d, and whole-body control its acceleration:
+
+        ḋ ≥ −(d − d_min) / T                            `condyle.ik`
+        d̈ ≥ −(2 / T) ḋ − (d − d_min) / T²               `condyle.wholebody`
+        ḋ = ∂d/∂q v + ∂d/∂t
+
+    ∂d/∂t follows from the velocities of obstacles, which `place` of a controller takes. A pair that is too near moves
+    apart. If the limits of the joints do not allow this for all pairs at once, a step of inverse kinematics keeps the
+    pairs from coming nearer, and its status is 'relaxed'. In whole-body control, the bounds become tasks of large
+    weight at such a tick.
+    """
+
+    pairs: Sequence[GeometryPair]
+    """The pairs of geometries."""
+    minimum: float = 0.01
+    """The minimum distance d_min (m)."""
+    look_ahead: float = 0.1
+    """The look-ahead time T (s), which should be at least some ticks."""
+    max_acceleration: float = 50.0
+    """The largest acceleration that a bound of whole-body control asks for (m/s²)."""
+    range: float = 0.2
+    """The distance above d_min beyond which a pair has no limit (m)."""
 
 
 class Distances(NamedTuple):
@@ -321,7 +358,10 @@ class Collisions:
         return self._inner._fit(shape)
 
     def disable(self, first: str, second: str) -> None:
-        """Removes all pairs of geometries on two links."""
+        """Removes all pairs of geometries on two links; `world` is the link of the world.
+
+        Raises `ModelError` for a link without collision shapes.
+        """
         self._inner._disable(first, second)
 
     def read_srdf(self, path: str | os.PathLike[str]) -> None:

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._condyle import Model, _DifferentialIk, _GlobalIk
-from .distances import GeometryPair, _geometry
+from .distances import DistanceLimits, GeometryPair, _geometry
 
 __all__ = [
     "DifferentialIk",
@@ -159,23 +159,6 @@ class JointLimits(NamedTuple):
     """The maximum acceleration a_max, nv numbers; None for no limits."""
 
 
-class DistanceLimits(NamedTuple):
-    """Limits of the distances d of pairs: ∂d/∂q Δq ≥ −min(γ T, 1) (d − d_min).
-
-    A pair that is too near moves apart. If the limits of the joints do not allow this for all pairs at once, the pairs
-    do not come nearer, and the status of the step is 'relaxed'.
-    """
-
-    pairs: Sequence[GeometryPair]
-    """The pairs of geometries, of `condyle.distances`."""
-    minimum: float = 0.01
-    """The minimum distance d_min (m)."""
-    rate: float = 10.0
-    """The rate γ at which a distance may approach its minimum (1/s)."""
-    range: float = 0.2
-    """The distance above d_min beyond which a pair has no limit (m)."""
-
-
 class Targets:
     """The targets of the tasks in one step. `DifferentialIk.hold` makes targets that keep the present values.
 
@@ -274,7 +257,7 @@ class DifferentialIk:
 
         minimise     ½ Σ w f (J Δq − α e)²  +  ½ μ Σ w f (α e)² ‖Δq‖²  +  ½ ε ‖Δq‖²
         subject to   limits of positions, velocities and accelerations: `JointLimits`
-                     limits of distances: `DistanceLimits`
+                     limits of distances: ∂d/∂q Δq + T ∂d/∂t ≥ −min(T / T_look, 1) (d − d_min)
 
     model: the robot; tasks: a list of `Task`.
     dt: the duration T of a step (s).
@@ -310,8 +293,8 @@ class DifferentialIk:
         """The tasks."""
         given = None
         if distances is not None:
-            pairs, minimum, rate, reach = distances
-            given = (_encoded(model, pairs), float(minimum), float(rate), float(reach))
+            pairs, *numbers = distances
+            given = (_encoded(model, pairs), *map(float, numbers))
         self._inner = _DifferentialIk(model, list(self.tasks), dt, damping, limits, given)
 
     def hold(self, q: ArrayLike) -> Targets:
@@ -360,18 +343,25 @@ class DifferentialIk:
         of the limits, the distance is a lower bound."""
         return self._inner._nearest()
 
-    def place(self, name: str, placement: ArrayLike) -> None:
-        """Sets the placement (4, 4) of the geometry with a name, for example of a moving obstacle.
+    def place(self, name: str, placement: ArrayLike, velocity: ArrayLike | None = None) -> None:
+        """Sets the placement of the geometry with a name, for example of a moving obstacle.
 
-        Raises `ValueError` if no geometry has this name.
+        placement: the pose (4, 4) in the world, or in the frame of the geometry.
+        velocity: the velocity of an obstacle in the world, [linear, angular], six numbers along the world's axes: the
+            velocity of the origin of its placement (m/s), and its angular velocity (rad/s); None for an obstacle at
+            rest. Limits of distances take into account how the obstacle moves in the next step.
+
+        Raises `ValueError` if no geometry has this name, or if a number is not finite.
         """
-        _placed(self._inner._place(name, placement), name)
+        _placed(self._inner._place(name, placement, velocity), name)
 
 
 class GlobalIk:
     """Global inverse kinematics: postures for target poses of one or several frames, from many starts.
 
-    Each start is a Levenberg–Marquardt descent with the limits of the joints. Several starts run at once in SIMD lanes.
+    Each start is a Levenberg–Marquardt descent with the limits of the joints. A start that reaches its target with a
+    pair that is too near goes on, and pushes the pairs apart. The first two starts of a target do so only with the rank
+    'nearest', because the next start is cheaper in most cases. Several starts run at once in SIMD lanes.
     The starts of a target are: the given posture; the entries of a table of random configurations that are nearest to
     the target; random configurations. The answers depend neither on the number of threads nor on other targets.
 

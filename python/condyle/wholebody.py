@@ -28,7 +28,6 @@ from ._wholebody import (
     Command,
     ComTarget,
     ContactTarget,
-    DistanceLimits,
     FrameTarget,
     Gains,
     JointLimits,
@@ -39,6 +38,7 @@ from ._wholebody import (
     References,
     Settings,
 )
+from .distances import DistanceLimits
 
 __all__ = [
     "ComTarget",

@@ -177,8 +177,8 @@ impl FileCollisions {
     }
 
     /// Disables the pairs of two links.
-    fn _disable(&mut self, first: &str, second: &str) {
-        self.inner.disable(first, second);
+    fn _disable(&mut self, first: &str, second: &str) -> PyResult<()> {
+        self.inner.disable(first, second).map_err(exception)
     }
 
     /// Disables the pairs of links that an SRDF lists.

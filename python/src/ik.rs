@@ -1,11 +1,11 @@
 //! Inverse kinematics: the compiled part of the module `condyle.ik`, which has the public classes.
 
-use crate::arrays::{Array, Give, numbers, output, vector};
+use crate::arrays::{Array, Give, array, check_last_row, numbers, output, vector};
 use crate::distances::valid_placement;
 use crate::exceptions::ik_error;
 use crate::model::Model;
 use crate::optimal::lock;
-use condyle::distances::GeometryPair;
+use condyle::distances::{DistancePairs, GeometryPair};
 use condyle::ik as rust;
 use condyle::spatial::Mat3;
 use condyle::{Se3, Vec3};
@@ -79,12 +79,18 @@ fn read_held(kind: &str, index: usize) -> PyResult<Held> {
 }
 
 /// Reads poses: 16 numbers for each, by rows.
-fn read_poses(numbers: &[f64], poses: &mut Vec<Se3<f64>>) {
+fn read_poses(name: &str, numbers: &[f64], poses: &mut Vec<Se3<f64>>) -> PyResult<()> {
+    for (k, m) in numbers.chunks_exact(16).enumerate() {
+        if check_last_row("", &m[12..]).is_err() {
+            check_last_row(&format!("{name}[{k}]"), &m[12..])?;
+        }
+    }
     poses.clear();
     poses.extend(numbers.chunks_exact(16).map(|m| {
         let column = |c: usize| Vec3::new(m[c], m[4 + c], m[8 + c]);
         Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3))
     }));
+    Ok(())
 }
 
 /// Steps of differential inverse kinematics; see `condyle.ik.DifferentialIk`.
@@ -111,7 +117,7 @@ impl DifferentialIk {
         posture: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
         let poses = crate::arrays::tensor("targets.frames", frames, [self.frames, 4, 4])?;
-        read_poses(&poses, &mut inner.targets.frames);
+        read_poses("targets.frames", &poses, &mut inner.targets.frames)?;
         inner.targets.com = crate::arrays::three("targets.com", com)?;
         inner.targets.posture.copy_from_slice(&vector("targets.posture", posture, self.nq)?);
         Ok(())
@@ -128,7 +134,7 @@ impl DifferentialIk {
         dt: f64,
         damping: f64,
         limits: Option<LimitMembers<'_>>,
-        distances: Option<(String, f64, f64, f64)>,
+        distances: Option<(String, f64, f64, f64, f64)>,
     ) -> PyResult<Self> {
         let tasks = tasks.into_iter().map(read_task).collect::<PyResult<Vec<_>>>()?;
         let limits = match limits {
@@ -142,8 +148,9 @@ impl DifferentialIk {
             None => None,
         };
         let distances = match distances {
-            Some((pairs, minimum, rate, range)) => {
-                Some(DistanceLimits { pairs: read_pairs(&pairs)?, minimum, rate, range })
+            Some((pairs, minimum, look_ahead, max_acceleration, range)) => {
+                let pairs = read_pairs(&pairs)?;
+                Some(DistanceLimits { pairs, minimum, look_ahead, max_acceleration, range })
             }
             None => None,
         };
@@ -218,17 +225,39 @@ impl DifferentialIk {
         Ok(lock("ik", &self.inner)?.ik.nearest())
     }
 
-    /// Sets the placement of the geometry with a name; returns whether it exists.
-    fn _place(&self, name: &str, placement: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let placement = valid_placement(placement)?;
-        Ok(place(lock("ik", &self.inner)?.ik.pairs_mut(), name, placement))
+    /// Sets placement and velocity of the geometry with a name; returns whether it exists.
+    #[pyo3(signature = (name, placement, velocity))]
+    fn _place(&self, name: &str, placement: &Bound<'_, PyAny>, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<bool> {
+        place(lock("ik", &self.inner)?.ik.pairs_mut(), name, placement, velocity)
     }
 }
 
-/// Sets the placement of a geometry; returns whether a geometry has the name.
-fn place(pairs: Option<&mut condyle::distances::DistancePairs>, name: &str, placement: Se3<f64>) -> bool {
-    let found = pairs.and_then(|pairs| pairs.find(name).map(|geometry| pairs.place(geometry, placement)));
-    found.is_some()
+/// Sets placement and velocity (0 if `None`) of the geometry with a name; returns whether it exists.
+pub(crate) fn place(
+    pairs: Option<&mut DistancePairs>,
+    name: &str,
+    placement: &Bound<'_, PyAny>,
+    velocity: Option<&Bound<'_, PyAny>>,
+) -> PyResult<bool> {
+    let placement = valid_placement(placement)?;
+    let numbers = velocity.map(|velocity| array::<6>("velocity", velocity)).transpose()?;
+    if let Some(numbers) = numbers.filter(|numbers| !numbers.iter().all(|x| x.is_finite())) {
+        return Err(PyValueError::new_err(format!("velocity: expected finite numbers, found {numbers:?}")));
+    }
+    let Some((pairs, geometry)) = pairs.and_then(|pairs| pairs.find(name).map(|geometry| (pairs, geometry))) else {
+        return Ok(false);
+    };
+    pairs.place(geometry, placement);
+    match (numbers, &pairs.geometry(geometry).frame) {
+        (Some(_), Some(frame)) => {
+            let what =
+                format!("velocity: `{name}` is on the frame `{}`; only obstacles in the world have one", frame.name);
+            return Err(PyValueError::new_err(what));
+        }
+        (None, Some(_)) => {}
+        (numbers, None) => pairs.set_velocity(geometry, numbers.unwrap_or_default().into()),
+    }
+    Ok(true)
 }
 
 /// Returns pairs of errors as an array (n, 2).
@@ -301,7 +330,7 @@ impl GlobalIk {
         posture: &Bound<'_, PyAny>,
     ) -> PyResult<AnswerMembers<'py>> {
         let mut poses = Vec::new();
-        read_poses(&crate::arrays::tensor("targets", targets, [count * self.frames, 4, 4])?, &mut poses);
+        read_poses("targets", &crate::arrays::tensor("targets", targets, [count * self.frames, 4, 4])?, &mut poses)?;
         let posture = vector("posture", posture, self.nq)?.to_vec();
         let ik = lock("ik", &self.inner)?;
         let ik = &*ik;
@@ -330,7 +359,6 @@ impl GlobalIk {
 
     /// Sets the placement of the geometry with a name; returns whether it exists.
     fn _place(&self, name: &str, placement: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let placement = valid_placement(placement)?;
-        Ok(place(lock("ik", &self.inner)?.pairs_mut(), name, placement))
+        place(lock("ik", &self.inner)?.pairs_mut(), name, placement, None)
     }
 }

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.distances import Geometry, Shape
 from condyle.optimal import (
     Activation,
     AugmentedLagrangian,
     Cost,
     FreeDynamics,
+    InteriorPoint,
     Limit,
     Problem,
     ProblemError,
@@ -86,6 +88,42 @@ def test_distances_are_copied_with_their_frames() -> None:
     assert repr(sphere) == "Sphere(center=[1.0, 2.0, 3.0], radius=0.5, frame=None)"
 
 
+def test_an_obstacle_moves_in_all_knots() -> None:
+    ball = Geometry(Shape.sphere([0.0, 0.0, 0.0], 0.1), name="ball")
+    tool = Geometry(Shape.capsule([0.0, 0.0, -0.1], [0.0, 0.0, 0.0], 0.05), "tool", name="hand")
+    placements = np.tile(np.eye(4), (6, 1, 1))
+    placements[:, :3, 3] = pose(X0, "tool")[:3, 3] + np.linspace([0.0, 0.4, 0.0], [0.0, 0.25, 0.0], 6)
+
+    def problem(balls: list[Geometry]) -> Problem:
+        costs = [Cost("rest", 0.1, Residual.state(X0)), Cost("effort", 1e-4, Residual.control(np.zeros(7)))]
+        each = [Limit("clear", Residual.distances(ARM, [(tool, one)]), lower=[0.05]) for one in balls]
+        knots = [FreeDynamics(ARM, 0.05, costs, limits=[limit]) for limit in each[:-1]]
+        return Problem(X0, knots, list(range(5)), FreeDynamics(ARM, None, costs[:1], limits=each[-1:]))
+
+    each = problem([ball._replace(placement=placement) for placement in placements])
+    moved = problem([ball] * 6)
+    moved.set_placements("ball", placements)
+    xs, us = np.tile(X0, (6, 1)), np.zeros((5, 7))
+    all_problems = (each, moved, pickle.loads(pickle.dumps(moved)))
+    plans = [InteriorPoint(p, max_iterations=10).solve(xs, us) for p in all_problems]
+    assert all(np.array_equal(plan.xs, plans[0].xs) for plan in plans)
+    with pytest.raises(KeyError, match="no pair of distances has a geometry 'bal'"):
+        moved.set_placements("bal", placements)
+    placements[2, 3, 3] = 2.0
+    with pytest.raises(ValueError, match=r"placements\[2\]: expected the last row \(0, 0, 0, 1\)"):
+        moved.set_placements("ball", placements)
+
+
+def test_a_violated_distance_is_named() -> None:
+    hand, floor = Geometry(Shape.sphere([0.0] * 3, 0.05), "tool", name="hand"), Geometry(Shape.half_space([0, 0, 1], 5))
+    clear = Limit("clear", Residual.distances(ARM, [(hand, floor)]), lower=[0.0])
+    knot = FreeDynamics(ARM, 0.05, [Cost("effort", 1e-4, Residual.control(np.zeros(7)))], limits=[clear])
+    solver = InteriorPoint(Problem(X0, [knot], [0] * 3, FreeDynamics(ARM, None, [])))
+    solver.solve(np.tile(X0, (4, 1)), np.zeros((3, 7)))
+    worst = solver.outcome.worst
+    assert worst is not None and worst.what == "`hand` and half-space in the world"
+
+
 def test_what_is_wrong_is_named() -> None:
     good = Sphere([0.0, 0.0, 0.1], 0.1, "tool")
 
@@ -100,6 +138,14 @@ def test_what_is_wrong_is_named() -> None:
     refused(ValueError, r"pairs\[0\]\[1\].center", [(good, Sphere([0.0, 1.0]))])
     refused(TypeError, r"pairs\[0\]\[0\].radius: expected a number", [(Sphere([0.0] * 3, "r", "tool"), good)])  # type: ignore[arg-type]
     refused(condyle.ModelError, "`tol`", [(good, Sphere([0.0] * 3, 0.1, "tol"))])
-    refused(ProblemError, r"cost `apart`: its pairs\[0\].second: radius is -0.1", [(good, Sphere([0.0] * 3, -0.1))])
-    refused(ProblemError, r"its pairs\[0\].first: center holds a NaN", [(Sphere([np.nan] * 3, 0.1, "tool"), good)])
-    refused(ProblemError, r"its pairs\[0\]: has no frame", [(Sphere([0.0] * 3), Sphere([1.0] * 3))])
+    refused(
+        ProblemError,
+        r"its pairs\[0\].second \(sphere in the world\): radius is -0.1",
+        [(good, Sphere([0.0] * 3, -0.1))],
+    )
+    refused(
+        ProblemError,
+        r"its pairs\[0\].first \(sphere on `tool`\): center holds a NaN",
+        [(Sphere([np.nan] * 3, 0.1, "tool"), good)],
+    )
+    refused(ProblemError, r"its pairs\[0\] \(.* and .*\): has no frame", [(Sphere([0.0] * 3), Sphere([1.0] * 3))])

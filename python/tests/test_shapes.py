@@ -107,7 +107,7 @@ def test_shapes_of_files(tmp_path: Path) -> None:
 
 def test_wrong_shapes_are_errors() -> None:
     ball = Geometry(Shape.sphere([0.0, 0.0, 0.0], 0.1))
-    with pytest.raises(condyle.ModelError, match=r"pairs\[0\]: has no frame"):
+    with pytest.raises(condyle.ModelError, match=r"pairs\[0\] \(sphere in the world and .*\): has no frame"):
         DistancePairs(ARM, [(ball, ball)])
     with pytest.raises(condyle.ModelError, match=r"pairs\[0\].first \(`tip`\): radius is -1"):
         DistancePairs(ARM, [(Geometry(Shape.sphere([0.0, 0.0, 0.0], -1.0), "tool", name="tip"), ball)])
@@ -116,6 +116,16 @@ def test_wrong_shapes_are_errors() -> None:
     pairs = DistancePairs(ARM, [(Geometry(SHAPES[0], "tool"), ball)])
     with pytest.raises(ValueError, match=r"q: expected shape \(7,\) or \(N, 7\), found \(6,\)"):
         distances(pairs, ARM, condyle.Data(ARM), np.zeros(6))
+    slanted = np.eye(4)
+    slanted[3, 0] = 0.5
+    last_row = r"placement: expected the last row \(0, 0, 0, 1\), found \[0.5, 0.0, 0.0, 1.0\]"
+    with pytest.raises(ValueError, match=last_row):
+        DistancePairs(ARM, [(Geometry(SHAPES[0], "tool", slanted), ball)])
+    named = DistancePairs(ARM, [(Geometry(SHAPES[0], "tool"), ball._replace(name="ball"))])
+    with pytest.raises(ValueError, match=last_row):
+        named.place("ball", slanted)
+    with pytest.raises(condyle.ModelError, match="link `nope`: has no collision shapes"):
+        Collisions.from_text(MJCF).disable("a", "nope")
     other = condyle.robots.quadruped()
     with pytest.raises(ValueError, match="made for another model"):
         distances(pairs, other, condyle.Data(other), condyle.neutral(other))

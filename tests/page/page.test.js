@@ -157,6 +157,28 @@ test("a posture has the motion to it, and tells whether the target is reached", 
   assert.deepEqual(wrong, []);
 });
 
+test("collision shapes are drawn when asked for, and their smallest distance has a plot", async () => {
+  const { page, wrong } = await open("apart");
+  const count = await page.evaluate(() => data.scene.collisions.length);
+  assert.ok(count > 2, `${count} shapes`);
+  assert.equal(await page.$eval("#solids", (button) => button.hidden), false);
+  const before = await picture(page);
+  await page.click("#solids");
+  await settled(page);
+  assert.equal(await page.$eval("#solids", (button) => button.getAttribute("aria-pressed")), "true");
+  assert.notEqual(await picture(page), before);
+  await page.screenshot({ path: join(folder, "apart.png"), fullPage: true });
+  const { distances, times, text } = await page.evaluate(() => ({ distances: data.apart.distances, times: data.times, text: $("key-distance").textContent }));
+  assert.equal(distances.length, times.length);
+  assert.match(text, /^[\d.]+ m?m: \S+ and \S+$/);
+  assert.equal(await page.$eval("#plot-distance", (plot) => plot.parentElement.hidden), false);
+  await page.evaluate(() => { player.seek(data.times.at(-1)); });
+  assert.notEqual(await page.$eval("#key-distance", (key) => key.textContent), text);
+  assert.deepEqual(wrong, []);
+  const { page: plain } = await open("reach");
+  assert.equal(await plain.$eval("#plot-distance", (plot) => plot.parentElement.hidden), await plain.evaluate(() => !data.apart));
+});
+
 test("meshes of three kinds of files are drawn in their colours, where they belong", async () => {
   const { page, wrong } = await open("meshes", { width: 700, height: 600 });
   const data = await page.evaluate(() => {

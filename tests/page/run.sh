@@ -27,6 +27,24 @@ fi
 "$program" plan --example trot >"$folder/pages/trot.toml"
 "$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
 "$program" ik arm7 --frame tool --target 0.45,-0.25,0.35,3.1,0,0.2 --out "$folder/pages/posture.html" >/dev/null
+cat >"$folder/pages/boxes.urdf" <<'URDF'
+<robot name="boxes">
+  <link name="base"><collision><geometry><box size="0.2 0.3 0.2"/></geometry></collision></link>
+  <link name="upper"><inertial><origin xyz="0 0 0.2"/><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.01" ixy="0"
+    ixz="0" iyz="0"/></inertial><collision><origin xyz="0 0 0.2"/><geometry><capsule radius="0.05" length="0.3"/></geometry>
+    </collision></link>
+  <link name="lower"><inertial><origin xyz="0 0 0.2"/><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0"
+    ixz="0" iyz="0"/></inertial><collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.04" length="0.3"/></geometry>
+    </collision></link>
+  <link name="tip"/>
+  <joint name="a" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.2"/><axis xyz="0 1 0"/>
+    <limit lower="-2.8" upper="2.8" velocity="2" effort="80"/></joint>
+  <joint name="b" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0 0 0.45"/><axis xyz="0 1 0"/>
+    <limit lower="-2.8" upper="2.8" velocity="2" effort="40"/></joint>
+  <joint name="c" type="fixed"><parent link="lower"/><child link="tip"/><origin xyz="0 0 0.4"/></joint>
+</robot>
+URDF
+"$program" ik "$folder/pages/boxes.urdf" --frame tip --target 0.5,0,0.3 --out "$folder/pages/apart.html" >/dev/null
 "$program" walk quadruped --command 0.5,0,0 --seconds 1 --rate 50 --out "$folder/pages/walk.html" >/dev/null
 # A page is also written for a motion that does not reach its target, so exit status 1 is not an error here.
 plan() { "$program" plan "$@" >/dev/null 2>"$folder/pages/notes" || [ $? = 1 ] || { cat "$folder/pages/notes"; exit 1; }; }

@@ -24,6 +24,10 @@
 //                       box [x, y, z] · sphere [radius] · cylinder [radius, length], axis z ·
 //                       capsule [radius, length of its straight part], axis z · segment [from (3), to (3), radius] ·
 //                       mesh [scale along x, y, z], with `part`, its index in scene.meshes
+//   scene.collisions  [] of { body (index), kind, size, position [3], quaternion [4] }: collision shapes, as in scene.bodies;
+//                     kind also "ellipsoid" [semi-axes x, y, z]; missing without shapes
+//   apart             { distances [N + 1], nearest [N + 1], pairs: [] of [name, name] }: smallest distance (m) of all pairs of
+//                     collision shapes, and index of the nearest pair; null without pairs
 //   scene.meshes      [] of { low [3], side [3], points, triangles }: bounding box of a part of a mesh, its points (three
 //                     numbers each, point = low + side n / 65535) and the corners of its triangles, as base64 of
 //                     16-bit numbers
@@ -429,6 +433,7 @@ try {
 const focus = (j) => { plots.focus(j); joints.mark(j); };
 const plots = makePlots(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes), focus });
 const walkPlots = data.walk && makeWalkPlots(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes) });
+const distancePlot = data.apart && makeDistancePlot(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes) });
 const joints = makeJoints(data, plots, focus);
 const gait = makeGait(data);
 const player = makePlayer(data.times, (t) => {
@@ -436,6 +441,7 @@ const player = makePlayer(data.times, (t) => {
   view?.show(k, s);
   plots.show(t);
   walkPlots?.show(t);
+  distancePlot?.show(t);
   joints.show(k);
   gait.show(t);
 });
@@ -460,6 +466,14 @@ else $("budget").closest("section").hidden = true;
 
 $("limits-note").textContent = UNITS_NOTE;
 $("reset").addEventListener("click", () => view?.reset());
+$("solids").hidden = !view || !data.scene.collisions?.length;
+$("solids").addEventListener("click", ({ currentTarget: button }) => {
+  const on = button.getAttribute("aria-pressed") !== "true";
+  button.setAttribute("aria-pressed", on);
+  button.title = `${on ? "Hide" : "Show"} the collision shapes`;
+  button.setAttribute("aria-label", button.title);
+  view.showSolids(on);
+});
 for (const input of document.querySelectorAll("input[name=scale]")) {
   input.addEventListener("change", () => {
     plots.scale(input.value === "share");
@@ -473,6 +487,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   view?.recolour();
   plots.rebuild();
   walkPlots?.rebuild();
+  distancePlot?.rebuild();
   progress?.rebuild();
   joints.recolour();
 });

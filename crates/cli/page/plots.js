@@ -284,6 +284,34 @@ function makePlots(data, on) {
   };
 }
 
+/**
+ * Plots columns over the time of the motion, in the element `id`. `columns` begins with times; `series` has the style of each
+ * further column, and `more` further scales. `on.seek(t)` and `on.hold(yes)` are as for `makePlots`.
+ */
+function timePlot({ id, label, columns, series, times, more = {} }, on) {
+  const host = document.getElementById(id);
+  host.parentElement.hidden = false;
+  const u = new uPlot({
+    width: host.clientWidth || 600,
+    height: 216,
+    legend: { show: false },
+    padding: [8, 12, 0, 0],
+    scales: { x: { time: false, range: () => [times[0], times.at(-1)] }, ...more },
+    cursor: { y: false, points: { show: false }, drag: { x: false, y: false }, bind: { mouseleave: () => () => null } },
+    axes: [axis({ label: "time (s)", labelSize: 18, size: 26 }), axis({ label, labelSize: 20, size: 50 })],
+    series: [{}, ...series],
+  }, columns, host);
+  const seek = ({ clientX }) => {
+    const box = u.over.getBoundingClientRect();
+    on.seek(u.posToVal(Math.min(Math.max(clientX - box.left, 0), box.width), "x"));
+  };
+  u.over.addEventListener("pointerenter", () => on.hold(true));
+  u.over.addEventListener("pointermove", seek);
+  u.over.addEventListener("pointerdown", seek);
+  for (const leave of ["pointerleave", "pointercancel"]) u.over.addEventListener(leave, () => on.hold(false));
+  return u;
+}
+
 /** Plots cost and gap over the iterations, on logarithmic scales. `on.pick(i)`: the pointer is at row i, or at no row (null). */
 function makeProgress(iterations, on) {
   const host = document.getElementById("plot-iterations");

@@ -90,6 +90,19 @@ function makeScene(data, host) {
     return group;
   });
 
+  // --- collision shapes: translucent and hidden at first, so that the robot stays visible inside
+  const solids = (data.scene.collisions ?? []).map((shape) => {
+    const material = materials.collision ??= new THREE.MeshStandardMaterial({ roughness: 0.8, transparent: true, opacity: 0.4, depthWrite: false });
+    const mesh = new THREE.Mesh(geometryOf(shape), material);
+    mesh.position.fromArray(shape.position);
+    mesh.quaternion.fromArray(shape.quaternion);
+    if (shape.kind === "ellipsoid") mesh.scale.fromArray(shape.size);
+    mesh.visible = false;
+    groups[shape.body].add(mesh);
+    return mesh;
+  });
+  if (materials.collision) themed.push([materials.collision, "--target"]);
+
   // --- path of the end-effector: the whole path faint, the travelled part strong
   const tip = new THREE.Mesh(new THREE.SphereGeometry(0.009 * size, 24, 16), new THREE.MeshBasicMaterial());
   let travelled = null;
@@ -249,6 +262,12 @@ function makeScene(data, host) {
     controls.update();
   });
 
+  /** Shows or hides the collision shapes. */
+  function showSolids(yes) {
+    for (const solid of solids) solid.visible = yes;
+    redraw();
+  }
+
   /** Applies the colours of the style sheet, light or dark. */
   function recolour() {
     scene.background = scene.fog.color = new THREE.Color(css("--sky"));
@@ -271,7 +290,7 @@ function makeScene(data, host) {
 
   recolour();
   reset();
-  return { show, reset, recolour, draw };
+  return { show, showSolids, reset, recolour, draw };
 }
 
 /**
@@ -313,6 +332,7 @@ function geometryOf({ kind, size }) {
   switch (kind) {
     case "box": return new THREE.BoxGeometry(...size);
     case "sphere": return new THREE.SphereGeometry(size[0], 40, 24);
+    case "ellipsoid": return new THREE.SphereGeometry(1, 40, 24); // the caller scales it
     // three.js draws these along y; in the data, as in a URDF, their axis is z
     case "cylinder": return new THREE.CylinderGeometry(size[0], size[0], size[1], 40).rotateX(Math.PI / 2);
     case "capsule": return new THREE.CapsuleGeometry(size[0], size[1], 12, 32).rotateX(Math.PI / 2);

@@ -10,30 +10,7 @@ function makeWalkPlots({ walk, times }, on) {
   const starts = times.slice(0, walk.velocities.length);
   const { ticks } = walk;
   let plots = [], now = times[0];
-
-  function plot(id, label, columns, series, more = {}) {
-    const host = document.getElementById(id);
-    host.parentElement.hidden = false;
-    const u = new uPlot({
-      width: host.clientWidth || 600,
-      height: 216,
-      legend: { show: false },
-      padding: [8, 12, 0, 0],
-      scales: { x: { time: false, range: () => [times[0], end] }, ...more },
-      cursor: { y: false, points: { show: false }, drag: { x: false, y: false }, bind: { mouseleave: () => () => null } },
-      axes: [axis({ label: "time (s)", labelSize: 18, size: 26 }), axis({ label, labelSize: 20, size: 50 })],
-      series: [{}, ...series],
-    }, columns, host);
-    const seek = ({ clientX }) => {
-      const box = u.over.getBoundingClientRect();
-      on.seek(u.posToVal(Math.min(Math.max(clientX - box.left, 0), box.width), "x"));
-    };
-    u.over.addEventListener("pointerenter", () => on.hold(true));
-    u.over.addEventListener("pointermove", seek);
-    u.over.addEventListener("pointerdown", seek);
-    for (const leave of ["pointerleave", "pointercancel"]) u.over.addEventListener(leave, () => on.hold(false));
-    return u;
-  }
+  const plot = (id, label, columns, series, more) => timePlot({ id, label, columns, series, times, more }, on);
 
   function rebuild() {
     for (const u of plots) u.destroy();

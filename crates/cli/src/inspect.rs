@@ -160,7 +160,7 @@ impl Report {
             },
             mimics: followers(robot, arguments, &lines),
             additions: Additions::new(model),
-            collisions: Shapes::new(robot, &arguments.robot.options),
+            collisions: Shapes::new(robot),
             warnings: findings::of(model, &lines),
         }
     }

@@ -4,6 +4,7 @@
 #![allow(non_snake_case)] // names of variables are symbols of the literature
 
 mod additions;
+mod apart;
 mod budget;
 mod check;
 mod error;

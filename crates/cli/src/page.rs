@@ -1,6 +1,7 @@
 //! Writes the HTML page of `condyle plan`, `condyle ik` and `condyle walk`: plots and playback in one file that needs
 //! no network.
 
+use crate::apart::Apart;
 use crate::budget::held;
 use crate::limits::LimitCounts;
 use crate::met::Met;
@@ -13,7 +14,7 @@ use std::path::Path;
 
 /// Placeholders of the template, and the texts that replace them, in this order. The data are inserted last. So text in
 /// the data is never replaced, even if it looks like a placeholder.
-const PARTS: [(&str, &str); 9] = [
+const PARTS: [(&str, &str); 10] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),
     ("/*{{three.js}}*/", include_str!("../page/vendor/three.bundle.js")),
@@ -21,6 +22,7 @@ const PARTS: [(&str, &str); 9] = [
     ("/*{{meshes.js}}*/", include_str!("../page/meshes.js")),
     ("/*{{scene.js}}*/", include_str!("../page/scene.js")),
     ("/*{{plots.js}}*/", include_str!("../page/plots.js")),
+    ("/*{{distance.js}}*/", include_str!("../page/distance.js")),
     ("/*{{walk.js}}*/", include_str!("../page/walk.js")),
     ("/*{{plan.js}}*/", include_str!("../page/plan.js")),
 ];
@@ -145,10 +147,13 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
     };
     let goal = plan.goal.as_ref();
     let mut data = Data::new(model);
-    let (mut poses, mut trail) = (Vec::new(), Vec::new());
+    let (mut poses, mut trail, mut apart) = (Vec::new(), Vec::new(), Apart::new(&plan.robot));
     for &t in &knots {
         let placements = forward_kinematics(model, &mut data, &solution.x(t)[..nq]);
         poses.push((0..model.bodies().len()).map(|i| scene::pose(placements.body(i))).collect::<Vec<_>>());
+        if let Some(apart) = &mut apart {
+            apart.add(placements);
+        }
         trail.extend(goal.map(|goal| placements.frame(goal.frame).translation.to_array()));
     }
     let driven = &knots[..knots.len() - 1];
@@ -187,12 +192,14 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
         "budget": budget,
         "scene": {
             "bodies": bodies,
+            "collisions": apart.as_ref().map(Apart::shapes),
             "meshes": meshes.written(),
             "poses": poses,
             "trail": (!trail.is_empty()).then_some(trail),
         },
         // Here, `contacts` cannot fail, because the solver has already used the same contacts.
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
+        "apart": apart.as_ref().and_then(Apart::distances),
         "limits": LimitCounts::new(&plan.robot),
         "violations": violations,
         "met": met.iter().map(|met| {

@@ -1,7 +1,8 @@
 //! Loads the robot of a command, from a file in any supported format or from the built-in robots.
 
 use crate::error::{Error, nearest};
-use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
+use condyle::distances::Collisions;
+use condyle::{Joint, MjcfOptions, Model, ModelError, SdfOptions, UrdfOptions, robots};
 use condyle_meshes::Places;
 use std::path::{Path, PathBuf};
 
@@ -104,6 +105,22 @@ pub(crate) struct Robot {
     pub text: String,
     /// Folders in which the program searches for the robot's meshes.
     pub places: Places,
+    options: ReadingOptions,
+}
+
+impl Robot {
+    /// Reads the collision shapes from the robot's file.
+    pub(crate) fn collisions(&self) -> Result<Collisions, ModelError> {
+        let packages = self.options.packages.clone();
+        match self.format {
+            Format::Urdf => Collisions::from_urdf_str(&self.text, &UrdfOptions { packages, ..UrdfOptions::default() }),
+            Format::Mjcf => Collisions::from_mjcf(&self.source, &MjcfOptions { packages, ..MjcfOptions::default() }),
+            Format::Sdf => {
+                let model = self.options.model.clone();
+                Collisions::from_sdf(&self.source, &SdfOptions { packages, model, ..SdfOptions::default() })
+            }
+        }
+    }
 }
 
 /// Loads a robot from a file, or a built-in robot.
@@ -121,7 +138,8 @@ pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error>
     } else {
         read(name, format, options)?
     };
-    Ok(Robot { model, source: name.to_owned(), format, text, places: places(&found) })
+    let places = places(&found);
+    Ok(Robot { model, source: name.to_owned(), format, text, places, options: options.clone() })
 }
 
 /// Returns the path of the robot's file, or `None` for a built-in robot. A package:// address is resolved later.
@@ -164,7 +182,8 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     };
     let model =
         Model::from_urdf_str(text, &UrdfOptions { root_joint, mimic: options.mimic, ..UrdfOptions::default() })?;
-    Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned(), places: Places::default() })
+    let (text, places) = (text.to_owned(), Places::default());
+    Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text, places, options: options.clone() })
 }
 
 /// Returns an error for a name that is neither a file nor a built-in robot. The message suggests the most similar name.

@@ -1,9 +1,9 @@
 //! Collision shapes of a robot, for `condyle inspect`: the shapes, the pairs that can collide, and the nearest pair.
 
-use crate::robot::{Format, ReadingOptions, Robot};
+use crate::robot::Robot;
 use crate::terminal::{Table, heading};
 use condyle::distances::{Collisions, DistancePairs, Distances};
-use condyle::{Data, MjcfOptions, Model, ModelError, SdfOptions, UrdfOptions, forward_kinematics, neutral};
+use condyle::{Data, Model, ModelError, forward_kinematics, neutral};
 use serde::Serialize;
 
 /// Collision shapes of a robot.
@@ -36,10 +36,10 @@ struct Nearest {
 
 impl Shapes {
     /// Reads the collision shapes of a robot. If they cannot be read, the reason is one of the messages.
-    pub(crate) fn new(robot: &Robot, options: &ReadingOptions) -> Self {
+    pub(crate) fn new(robot: &Robot) -> Self {
         let (shapes, left_out) = (Vec::new(), Vec::new());
         let empty = Self { shapes, pairs: 0, nearest: None, left_out };
-        let found = read(robot, options).and_then(|collisions| Self::of(&robot.model, &collisions));
+        let found = robot.collisions().and_then(|collisions| Self::of(&robot.model, &collisions));
         found.unwrap_or_else(|error| Self { left_out: vec![error.to_string()], ..empty })
     }
 
@@ -87,18 +87,5 @@ impl Shapes {
             text += &format!("  left out: {message}\n");
         }
         text
-    }
-}
-
-/// Reads the collision shapes from the robot's file.
-fn read(robot: &Robot, options: &ReadingOptions) -> Result<Collisions, ModelError> {
-    let packages = options.packages.clone();
-    match robot.format {
-        Format::Urdf => Collisions::from_urdf_str(&robot.text, &UrdfOptions::default()),
-        Format::Mjcf => Collisions::from_mjcf(&robot.source, &MjcfOptions { packages, ..MjcfOptions::default() }),
-        Format::Sdf => {
-            let model = options.model.clone();
-            Collisions::from_sdf(&robot.source, &SdfOptions { packages, model, ..SdfOptions::default() })
-        }
     }
 }

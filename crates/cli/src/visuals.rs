@@ -36,23 +36,13 @@ pub(crate) enum Geometry {
 /// Returns the visuals of all links, in the order of the file. A visual that cannot be read is skipped, because a robot
 /// without this visual can still be used.
 pub(crate) fn read(urdf: &str) -> Vec<Visual> {
-    shapes(urdf, "visual")
-}
-
-/// Returns the collision shapes of all links, in the order of the file, without colours.
-pub(crate) fn collisions(urdf: &str) -> Vec<Visual> {
-    shapes(urdf, "collision")
-}
-
-/// Returns the shapes in all elements of one type.
-fn shapes(urdf: &str, tag: &'static str) -> Vec<Visual> {
     let Ok(urdf) = Model::well_formed(urdf) else { return Vec::new() };
     let Ok(document) = Document::parse(&urdf) else { return Vec::new() };
     let robot = document.root_element();
     let mut visuals = Vec::new();
     for link in children(robot, "link") {
         let Some(name) = link.attribute("name") else { continue };
-        for visual in children(link, tag) {
+        for visual in children(link, "visual") {
             let Some(geometry) = child(visual, "geometry").and_then(geometry) else { continue };
             let color = child(visual, "material").and_then(|material| color(material, robot));
             visuals.push(Visual { link: name.to_owned(), origin: origin(visual), geometry, color });

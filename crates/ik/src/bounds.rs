@@ -20,6 +20,27 @@ struct Limited {
 pub(crate) struct Bounds {
     gain: f64,
     joints: Vec<Limited>,
+    /// Limits that the lower and the upper bound of each coordinate came from, at the last step.
+    causes: Vec<[Cause; 2]>,
+}
+
+/// Limit of a joint from which a bound comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cause {
+    Velocity,
+    Position,
+    Acceleration,
+}
+
+impl Cause {
+    /// Returns the limited quantity in words.
+    pub(crate) fn quantity(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Position => "position",
+            Self::Acceleration => "acceleration",
+        }
+    }
 }
 
 /// Returns the position limits of each coordinate in v: its index in q, and its limits. Free-flyers and joints on a
@@ -64,7 +85,8 @@ impl Bounds {
     pub(crate) fn new(model: &Model, settings: Option<&JointLimits>) -> Result<Self, Error> {
         let free = Limited { position: None, velocity: f64::INFINITY, acceleration: f64::INFINITY };
         let Some(settings) = settings else {
-            return Ok(Self { gain: 1.0, joints: vec![free; model.nv()] });
+            let causes = vec![[Cause::Velocity; 2]; model.nv()];
+            return Ok(Self { gain: 1.0, joints: vec![free; model.nv()], causes });
         };
         let limits = model.limits();
         let lower = settings.lower.as_deref().unwrap_or(&limits.lower);
@@ -76,18 +98,31 @@ impl Bounds {
             velocity: velocity[i],
             acceleration: settings.acceleration.as_ref().map_or(f64::INFINITY, |a| a[i]),
         };
-        Ok(Self { gain: settings.gain, joints: (0..model.nv()).map(joint).collect() })
+        let causes = vec![[Cause::Velocity; 2]; model.nv()];
+        Ok(Self { gain: settings.gain, joints: (0..model.nv()).map(joint).collect(), causes })
+    }
+
+    /// Returns the limit from which a bound of a coordinate came at the last step. side: 0 for the lower bound, 1 for
+    /// the upper one.
+    pub(crate) fn cause(&self, coordinate: usize, side: usize) -> Option<Cause> {
+        self.causes.get(coordinate).map(|causes| causes[side])
     }
 
     /// Writes the bounds at q, for a step of duration `dt` after the velocity v₀.
-    pub(crate) fn write(&self, q: &[f64], v0: &[f64], dt: f64, lower: &mut [f64], upper: &mut [f64]) {
-        for (i, joint) in self.joints.iter().enumerate() {
+    pub(crate) fn write(&mut self, q: &[f64], v0: &[f64], dt: f64, lower: &mut [f64], upper: &mut [f64]) {
+        for (i, (joint, causes)) in self.joints.iter().zip(&mut self.causes).enumerate() {
             let reach = dt * joint.velocity;
             let mut interval = [-reach, reach];
+            *causes = [Cause::Velocity; 2];
+            let mut narrow = |with: [f64; 2], cause: Cause| {
+                let next = nearest(interval, with);
+                (0..2).filter(|&side| next[side] != interval[side]).for_each(|side| causes[side] = cause);
+                interval = next;
+            };
             let mut below_above = [f64::INFINITY; 2];
             if let Some((k, least, most)) = joint.position {
                 below_above = [q[k] - least, most - q[k]];
-                interval = nearest(interval, [-self.gain * below_above[0], self.gain * below_above[1]]);
+                narrow([-self.gain * below_above[0], self.gain * below_above[1]], Cause::Position);
             }
             if joint.acceleration.is_finite() {
                 let (from, change) = (dt * v0[i], dt * dt * joint.acceleration);
@@ -95,8 +130,8 @@ impl Bounds {
                 let stop =
                     |d: f64| if d.is_finite() { (change * (change + 2.0 * d.max(0.0))).sqrt() - change } else { d };
                 let [below, above] = below_above.map(stop);
-                interval = nearest(interval, [-below, above]);
-                interval = nearest(interval, [from - change, from + change]);
+                narrow([-below, above], Cause::Position);
+                narrow([from - change, from + change], Cause::Acceleration);
             }
             [lower[i], upper[i]] = interval;
         }

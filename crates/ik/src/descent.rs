@@ -8,10 +8,17 @@
 //!
 //! A coordinate at a limit whose gradient points out of the limit is left out of the step.
 //!
+//! In lanes that push, each pair whose distance d is below a margin m has the error m − d, too. Its row of J is ∂d/∂q.
+//!
 //! Source: Sugihara, *Solvability-unconcerned inverse kinematics by the Levenberg–Marquardt method* (2011), equation
 //! 21.
 
-use condyle_dynamics::{Data, Model, Quaternion, ReferenceFrame, Se3, Vec3, forward_kinematics, integrate, lie};
+use condyle_dynamics::distances::prepared::{
+    NUMBERS, Near, PreparedPairs, RESULT, find_near, other_results, pair_distances, place_shapes, write_row,
+};
+use condyle_dynamics::{
+    Data, Model, Placements, Quaternion, ReferenceFrame, Se3, Vec3, forward_kinematics, integrate, lie,
+};
 use condyle_spatial::block::{Block, Real, SimdToken, gather, lanes, scatter};
 use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Mat3, Matrix, Scalar, matrix};
@@ -65,10 +72,80 @@ pub(crate) struct Descent<S> {
     free: Vec<S>,
     /// Square of the position error, and of the rotation error, of each frame.
     squares: Vec<S>,
+    push: Option<Push<S>>,
+}
+
+/// Pairs that a step pushes apart.
+struct Push<S> {
+    pairs: PreparedPairs,
+    /// Distance below which a pair is pushed (m).
+    margin: f64,
+    /// 1 for lanes that push, 0 for the others.
+    chosen: Vec<f64>,
+    weight: [S; 1],
+    /// Sum of the squares of all errors m − d, before the last step.
+    excess: [S; 1],
+    shapes: Vec<S>,
+    /// Pairs that may be below the margin in some lane.
+    near: Near,
+    results: Vec<S>,
+    row: Vec<S>,
+}
+
+impl<S: Block<Number = f64>> Push<S> {
+    fn new(pairs: PreparedPairs, margin: f64, nv: usize) -> Self {
+        let (zeros, mut near) = (|n| vec![S::zero(); n], Near::default());
+        near.reset(margin, pairs.len());
+        Self {
+            margin,
+            chosen: vec![0.0; S::LANES],
+            weight: [S::zero()],
+            excess: [S::zero()],
+            shapes: zeros(pairs.shape_count() * NUMBERS),
+            near,
+            results: zeros(pairs.len() * RESULT),
+            row: zeros(nv),
+            pairs,
+        }
+    }
+
+    /// Adds the errors of all pairs that are too near to Jᵀ e and to the lower triangle of Jᵀ J. Returns the sum of
+    /// their squares.
+    #[inline(always)]
+    fn add(&mut self, placements: Placements<'_, S>, step: &mut [S], A: &mut [S]) -> S {
+        let Self { pairs, margin, weight: [weight], excess: [excess], shapes, near, results, row, .. } = self;
+        place_shapes(placements, pairs, true, shapes);
+        find_near(pairs, shapes, near);
+        pair_distances(pairs, shapes, near, results);
+        other_results(placements, &|_| pairs, S::LANES, near, results);
+        let (n, zero) = (step.len(), S::zero());
+        *excess = zero;
+        for k in (0..pairs.len()).filter(|&k| near.is_near(k)) {
+            let result = &results[k * RESULT..][..RESULT];
+            let e = (S::splat(*margin) - result[0]) * *weight; // m − d
+            let near = zero.lt(e);
+            if !S::any(near) {
+                continue;
+            }
+            let e = S::select(near, e, zero);
+            let one = S::select(near, S::one(), zero);
+            *excess += e * e;
+            write_row(placements, pairs, k, result, row); // ∂d/∂q
+            for i in 0..n {
+                step[i] += row[i] * e;
+                let scaled = row[i] * one;
+                for j in i..n {
+                    A[i * n + j] += scaled * row[j];
+                }
+            }
+        }
+        *excess
+    }
 }
 
 impl<S: Block<Number = f64>> Descent<S> {
-    pub(crate) fn new(model: &Model, frames: usize) -> Self {
+    /// Allocates the memory for a number of frames, and for pairs that steps push apart up to a margin (m).
+    pub(crate) fn new(model: &Model, frames: usize, pairs: Option<(PreparedPairs, f64)>) -> Self {
         let (nq, nv, zeros) = (model.nq(), model.nv(), |n| vec![S::zero(); n]);
         Self {
             data: Data::new(model),
@@ -80,7 +157,22 @@ impl<S: Block<Number = f64>> Descent<S> {
             step: zeros(nv),
             free: zeros(nv),
             squares: zeros(2 * frames),
+            push: pairs.map(|(pairs, margin)| Push::new(pairs, margin, nv)),
         }
+    }
+
+    /// Chooses whether steps of a lane push pairs apart.
+    pub(crate) fn set_push(&mut self, lane: usize, on: bool) {
+        if let Some(push) = &mut self.push {
+            push.chosen[lane] = f64::from(u8::from(on));
+            gather(&push.chosen, S::LANES, &mut push.weight);
+        }
+    }
+
+    /// Returns the sum of the squares of m − d over the pairs that a lane pushes (m²), before the last step.
+    pub(crate) fn excess(&self, lane: usize) -> f64 {
+        let pushing = self.push.as_ref().filter(|push| push.chosen[lane] != 0.0);
+        pushing.map_or(0.0, |push| lanes(&push.excess)[lane])
     }
 
     /// Reads the targets of all lanes: `LANES` rows, one after the other.
@@ -119,7 +211,7 @@ impl<S: Block<Number = f64>> Kernel for Iterate<'_, S> {
     #[inline(always)]
     fn run(self) {
         let Self { model, aim, descent } = self;
-        let Descent { data, q, next, targets, J, A, step, free, squares } = descent;
+        let Descent { data, q, next, targets, J, A, step, free, squares, push } = descent;
         let n = step.len();
         A.fill(S::zero());
         step.fill(S::zero());
@@ -150,6 +242,9 @@ impl<S: Block<Number = f64>> Kernel for Iterate<'_, S> {
                     A[i * n + j] += v.dot(x) + u.dot(y); // Jᵀ W J
                 }
             }
+        }
+        if let Some(push) = push.as_mut().filter(|push| push.chosen.iter().any(|x| *x != 0.0)) {
+            energy += push.add(placements, step, A);
         }
         // λ = E + ε
         let lambda = energy * S::splat(0.5) + S::splat(LEAST_DAMPING);

@@ -218,7 +218,7 @@ impl DifferentialIk {
     /// q: nq numbers. Allocates nothing.
     ///
     /// # Errors
-    /// In the same cases as [`step`](Self::step).
+    /// In the same cases as [`step`](Self::step), and [`Error::Setting`] for a tolerance that is negative or NaN.
     pub fn converge(
         &mut self,
         q: &mut [f64],
@@ -226,6 +226,11 @@ impl DifferentialIk {
         tolerance: [f64; 2],
         steps: usize,
     ) -> Result<usize, Error> {
+        for tolerance in tolerance {
+            if tolerance.is_nan() || tolerance < 0.0 {
+                return Err(Error::Setting { name: "tolerance", value: tolerance, allowed: "at least 0" });
+            }
+        }
         let mut v0 = std::mem::take(&mut self.next[0]);
         v0.fill(0.0);
         let mut made = 0;
@@ -263,9 +268,11 @@ impl DifferentialIk {
         &self.step
     }
 
-    /// Returns a limit in words, with the name of the joint or of the geometries.
+    /// Returns a limit of the last step in words, with the name of the joint or of the geometries. A limit of velocity
+    /// or acceleration is called so.
     pub fn describe(&self, held: Held) -> String {
-        held.describe(&self.model, self.separation.as_ref().map(|separation| &separation.pairs))
+        let pairs = self.separation.as_ref().map(|separation| &separation.pairs);
+        held.describe(&self.model, pairs, Some(&self.bounds))
     }
 
     fn check(&self, q: &[f64], v0: &[f64], targets: &Targets) -> Result<(), Error> {

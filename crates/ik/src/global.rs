@@ -177,7 +177,7 @@ impl GlobalIk {
 
     /// Returns a limit in words, with the name of the joint.
     pub fn describe(&self, held: Held) -> String {
-        held.describe(&self.model, self.pairs.as_ref())
+        held.describe(&self.model, self.pairs.as_ref(), None)
     }
 
     fn fill_table(&mut self) {

@@ -1,5 +1,6 @@
 //! Limits that hold a step or a posture back.
 
+use crate::bounds::{Bounds, Cause};
 use crate::separation::pair_names;
 use condyle_dynamics::distances::DistancePairs;
 use condyle_dynamics::{Body, Model};
@@ -17,17 +18,24 @@ pub enum Held {
 }
 
 impl Held {
-    /// Returns the limit in words, with the name of the joint or of the geometries.
-    pub(crate) fn describe(self, model: &Model, pairs: Option<&DistancePairs>) -> String {
+    /// Returns the limit in words, with the name of the joint or of the geometries. `bounds` tells which limit of a
+    /// joint holds a step; without it, the limit is a limit of position.
+    pub(crate) fn describe(self, model: &Model, pairs: Option<&DistancePairs>, bounds: Option<&Bounds>) -> String {
         let (i, side) = match self {
-            Self::Lower(i) => (i, "lower"),
-            Self::Upper(i) => (i, "upper"),
+            Self::Lower(i) => (i, 0),
+            Self::Upper(i) => (i, 1),
             Self::Pair(i) => {
                 let names = pairs.map_or(String::new(), |pairs| pair_names(pairs, i));
                 return format!("distance of {names}");
             }
         };
-        format!("{side} limit of joint `{}`", joint_name(model, i))
+        let (word, joint) = (["lower", "upper"][side], joint_name(model, i));
+        match bounds.and_then(|bounds| bounds.cause(i, side)) {
+            Some(cause) if cause != Cause::Position => {
+                format!("{word} limit of the {} of joint `{joint}`", cause.quantity())
+            }
+            _ => format!("{word} limit of joint `{joint}`"),
+        }
     }
 }
 

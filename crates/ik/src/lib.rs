@@ -39,13 +39,13 @@ mod separation;
 mod settings;
 mod task;
 
+pub use condyle_dynamics::distances::DistanceLimits;
 pub use differential::{DifferentialIk, Status, Step};
 pub use error::Error;
 pub use global::{GlobalIk, Outcome, Posture};
 pub use held::Held;
 pub use rows::Targets;
 pub use search_settings::{Rank, SearchSettings};
-pub use separation::DistanceLimits;
 pub use settings::{JointLimits, Settings};
 pub use task::{Task, TaskKind};
 

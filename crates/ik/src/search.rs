@@ -3,6 +3,8 @@
 use crate::descent::{Descent, TARGET, write_target};
 use crate::global::{Apart, GlobalIk, Outcome, Posture};
 use crate::held::Held;
+use crate::search_settings::Rank;
+use condyle_dynamics::distances::prepared::PreparedPairs;
 use condyle_dynamics::{Se3, neutral, normalize};
 use condyle_spatial::block::Block;
 use rand::SeedableRng;
@@ -38,6 +40,8 @@ struct Job {
     /// Least weighted error so far, and the iteration at which it last fell clearly.
     least: f64,
     fell: usize,
+    /// Whether steps push pairs apart.
+    pushes: bool,
 }
 
 /// Progress of the search for one target.
@@ -75,15 +79,22 @@ pub(crate) struct Search<'a, S> {
 /// Iterations without a clear fall of the error, after which a start is given up, and the factor of a clear fall.
 const STALLED: usize = 6;
 const CLEAR: f64 = 0.7;
+/// Distance beyond the minimum up to which pairs are pushed apart (m); a descent ends inside of the minimum.
+const BEYOND: f64 = 1e-3;
+/// First start of a target that pushes pairs apart: for most targets of an arm, the next start is cheaper. If postures
+/// are ranked by their distance from the given one, the first start pushes, too.
+const FIRST_PUSH: usize = 2;
 
 impl<'a, S: Block<Number = f64>> Search<'a, S> {
     pub(crate) fn new(ik: &'a GlobalIk, targets: &'a [Se3<f64>], posture: &'a [f64]) -> Self {
         let (frames, nq) = (ik.aim.frames.len(), ik.model.nq());
+        let margin = ik.settings.minimum_distance + BEYOND;
+        let pairs = ik.pairs.as_ref().map(|pairs| (PreparedPairs::from(pairs), margin));
         Self {
             ik,
             targets,
             posture,
-            descent: Descent::new(&ik.model, frames),
+            descent: Descent::new(&ik.model, frames, pairs),
             jobs: vec![None; S::LANES],
             progress: vec![Progress::default(); targets.len() / frames],
             q: neutral(&ik.model).repeat(S::LANES),
@@ -154,7 +165,8 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         let nq = self.ik.model.nq();
         let start = self.progress[target].trials.len();
         self.progress[target].trials.push(None);
-        self.jobs[lane] = Some(Job { target, start, iteration: 0, least: f64::INFINITY, fell: 0 });
+        self.jobs[lane] = Some(Job { target, start, iteration: 0, least: f64::INFINITY, fell: 0, pushes: false });
+        self.descent.set_push(lane, false);
         let frames = self.ik.aim.frames.len();
         let row = &mut self.rows[lane * TARGET * frames..][..TARGET * frames];
         for (pose, to) in self.targets[target * frames..][..frames].iter().zip(row.chunks_exact_mut(TARGET)) {
@@ -202,14 +214,15 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         self.progress[target].nearest.extend(self.distances[..count].iter().map(|&(_, k)| k));
     }
 
-    /// Looks at the position of a lane before the last step. Ends its start if it is at the target, or makes no
-    /// progress.
+    /// Looks at the position of a lane before the last step. Ends its start if it is at the target with all pairs far
+    /// enough apart, or makes no progress. At the target with a pair that is too near, the start goes on and pushes
+    /// pairs apart.
     fn look(&mut self, lane: usize, answers: &mut [Option<Posture>]) {
         let Some(mut job) = self.jobs[lane].filter(|job| !self.progress[job.target].done) else { return };
         let (settings, nq) = (&self.ik.settings, self.ik.model.nq());
         let error = self.descent.errors(lane);
         let reached = error[0] <= settings.tolerance[0] && error[1] <= self.ik.rotation_tolerance();
-        let weighted = self.ik.weighted(error);
+        let weighted = self.ik.weighted(error) + self.descent.excess(lane);
         if weighted < CLEAR * CLEAR * job.least {
             (job.least, job.fell) = (weighted, job.iteration);
         }
@@ -219,10 +232,19 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         if !reached && !stuck {
             return;
         }
-        self.jobs[lane] = None;
         let mut q = self.q[lane * nq..][..nq].to_vec();
         normalize(&self.ik.model, &mut q);
         let collision = self.apart.as_mut().and_then(|apart| apart.collision(self.ik, &q));
+        let may_push = job.start >= FIRST_PUSH || settings.rank == Rank::Nearest;
+        if reached && collision.is_some() && !job.pushes && may_push {
+            self.jobs[lane] = Some(Job { iteration: 0, least: f64::INFINITY, fell: 0, pushes: true, ..job });
+            self.descent.set_push(lane, true);
+            return;
+        }
+        if reached && collision.is_some() && job.pushes && !stuck {
+            return; // the push goes on
+        }
+        self.jobs[lane] = None;
         self.progress[job.target].trials[job.start] = Some(Trial { q, error, reached, collision });
         self.conclude(job.target, answers);
     }

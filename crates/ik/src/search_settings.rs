@@ -34,7 +34,7 @@ pub struct SearchSettings {
     pub orientation_weight: f64,
     /// Maximum number of starts for a target; at least 1.
     pub starts: usize,
-    /// Maximum number of iterations of a start; at least 1.
+    /// Maximum number of iterations of a start; at least 1. A start that then pushes pairs apart may make as many more.
     pub iterations: usize,
     /// Number of postures from which `rank` chooses; at least 1. A search ends when this many starts reached the
     /// target.

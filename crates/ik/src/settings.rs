@@ -1,8 +1,8 @@
 //! Settings of differential inverse kinematics, and limits of the joints.
 
 use crate::error::{Error, length};
-use crate::separation::DistanceLimits;
 use condyle_dynamics::Model;
+use condyle_dynamics::distances::DistanceLimits;
 
 /// Limits of positions, velocities and accelerations, as bounds on the displacement Δq of one step of duration T.
 ///
@@ -77,7 +77,9 @@ impl Settings {
     pub(crate) fn check(&self, model: &Model) -> Result<(), Error> {
         positive("dt", self.dt)?;
         positive("damping", self.damping)?;
-        self.distances.as_ref().map_or(Ok(()), DistanceLimits::check)?;
+        if let Some((name, value, allowed)) = self.distances.as_ref().and_then(DistanceLimits::wrong) {
+            return Err(Error::Setting { name, value, allowed });
+        }
         self.limits.as_ref().map_or(Ok(()), |limits| limits.check(model))
     }
 }

@@ -240,6 +240,30 @@ fn humanoids_reach_with_their_feet_in_place() {
 
 /// A target out of reach, at a singular position, gives finite velocities, and the arm comes to rest near it.
 #[test]
+fn the_limit_that_holds_a_step_is_named() {
+    let model = robots::arm7();
+    let limits = model.limits();
+    let named = |dt: f64, q: &[f64], acceleration: Option<Vec<f64>>| {
+        let limits = JointLimits { gain: 1.0, acceleration, ..JointLimits::default() };
+        let settings = Settings { dt, limits: Some(limits), ..Settings::default() };
+        let mut ik = DifferentialIk::new(&model, &[Task::posture()], settings).unwrap();
+        let mut targets = ik.hold(q).unwrap();
+        targets.posture[1] = model.limits().upper[1];
+        let held = ik.step(q, &[0.0; 7], &targets).unwrap().held.clone();
+        held.iter().map(|&held| ik.describe(held)).collect::<Vec<_>>()
+    };
+    let q = vec![0.0; 7];
+    assert!(limits.velocity[1].is_finite() && limits.upper[1].is_finite());
+    assert_eq!(named(1e-3, &q, None), ["upper limit of the velocity of joint `joint2`"]);
+    assert_eq!(named(1e-3, &q, Some(vec![1.0; 7])), ["upper limit of the acceleration of joint `joint2`"]);
+    let mut ik = DifferentialIk::new(&model, &[Task::position("tool")], Settings::default()).unwrap();
+    let mut targets = ik.hold(&q).unwrap();
+    targets.frames[0].translation.x += 0.1;
+    let refused = ik.converge(&mut q.clone(), &targets, [f64::NAN, 1e-3], 10).unwrap_err().to_string();
+    assert_eq!(refused, "setting `tolerance` is NaN, but it must be at least 0");
+}
+
+#[test]
 fn targets_out_of_reach_are_approached() {
     let model = robots::arm7();
     let tasks = [Task { damping: 1.0, ..Task::position("tool") }, Task::posture()];

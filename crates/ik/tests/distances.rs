@@ -1,8 +1,12 @@
 //! Steps and searches keep the distances of pairs.
 
 use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
-use condyle_dynamics::{Data, Model, Se3, Vec3, forward_kinematics, integrate, random_configuration, robots};
-use condyle_ik::{DifferentialIk, DistanceLimits, GlobalIk, Held, Outcome, SearchSettings, Settings, Status, Task};
+use condyle_dynamics::{
+    Data, Mat3, Model, Motion, Se3, Vec3, forward_kinematics, integrate, random_configuration, robots,
+};
+use condyle_ik::{
+    DifferentialIk, DistanceLimits, GlobalIk, Held, Outcome, Rank, SearchSettings, Settings, Status, Task,
+};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
@@ -84,6 +88,36 @@ fn pairs_that_are_too_near_move_apart() {
 }
 
 /// Two obstacles squeeze the tool from both sides: it cannot leave both at once, but it does not come nearer.
+/// Checks that steps take into account how an obstacle moves.
+#[test]
+fn an_obstacle_that_comes_nearer_is_kept_at_a_distance() {
+    let model = robots::arm7();
+    let speed = Vec3::new(0.0, -0.5, 0.0);
+    let start = vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0];
+    let tool = model.frame("tool").unwrap();
+    let from = forward_kinematics(&model, &mut Data::new(&model), &start).frame(tool).translation;
+    let at = |t: f64| Se3::new(Mat3::identity(), from + Vec3::new(0.0, 0.4, 0.0) + speed.scale(t));
+    let least = |is_known: bool| {
+        let mut ik = arm(vec![GeometryPair::new(ball("tool", 0.03), obstacle(Vec3::zero(), 0.08))]);
+        let (mut q, targets) = (start.clone(), ik.hold(&start).unwrap());
+        let (dt, mut least) = (ik.settings().dt, f64::INFINITY);
+        for k in 0..120 {
+            let pairs = ik.pairs_mut().unwrap();
+            let moving = pairs.find("obstacle").unwrap();
+            pairs.place(moving, at(dt * f64::from(k)));
+            if is_known {
+                pairs.set_velocity(moving, Motion::new(speed, Vec3::zero()));
+            }
+            advance(&mut ik, &mut q, &targets);
+            least = least.min(ik.nearest().unwrap().1);
+        }
+        least
+    };
+    let (known, unknown) = (least(true), least(false));
+    assert!(known > 0.02 - CURVED, "{known}");
+    assert!(unknown < known - 5e-3, "{unknown} without the velocity, {known} with it");
+}
+
 #[test]
 fn contradictory_distances_are_relaxed() {
     let model = robots::arm7();
@@ -138,6 +172,40 @@ fn searches_keep_pairs_apart() {
     assert!(reached >= 198, "{reached} of 200");
 }
 
+/// A single start pushes pairs apart only if postures are ranked by distance, so both ranks show what the push does.
+#[test]
+fn starts_push_pairs_apart() {
+    let model = robots::arm7();
+    let mut pairs = self_pairs();
+    for k in 0..8 {
+        let (sin, cos) = (f64::from(k) * core::f64::consts::FRAC_PI_4).sin_cos();
+        let at = Se3::new(Mat3::identity(), Vec3::new(0.4 * cos, 0.4 * sin, 0.6));
+        let post = Geometry::in_world(Shape::Box { half_sizes: Vec3::new(0.03, 0.03, 0.4) }).named("post").at(at);
+        pairs.extend(["link4", "link5", "link6", "tool"].map(|n| GeometryPair::new(ball(n, 0.06), post.clone())));
+    }
+    let (mut rng, mut data) = (StdRng::seed_from_u64(3), Data::new(&model));
+    let tool = model.frame("tool").unwrap();
+    let mut targets = Vec::new();
+    while targets.len() < 200 {
+        let q = random_configuration(&model, &mut rng);
+        if smallest(&model, &pairs, &q) > 0.02 {
+            targets.push(forward_kinematics(&model, &mut data, &q).frame(tool));
+        }
+    }
+    let reached = |rank: Rank| {
+        let once = SearchSettings { starts: 1, orientation_weight: 0.0, rank, ..SearchSettings::default() };
+        let settings = SearchSettings { pairs: pairs.clone(), minimum_distance: 0.01, ..once };
+        let answers = GlobalIk::new(&model, &["tool"], settings).unwrap().solve_many(&targets, &[0.5; 7]).unwrap();
+        for answer in answers.iter().filter(|answer| answer.reached()) {
+            assert!(smallest(&model, &pairs, &answer.q) >= 0.01 - 1e-9 && answer.error[0] <= 1e-4);
+            model.check_position(&answer.q).unwrap();
+        }
+        answers.iter().filter(|answer| answer.reached()).count()
+    };
+    let (without, with) = (reached(Rank::First), reached(Rank::Nearest));
+    assert!(without < 160 && with >= without + 30, "{without} without pushes, {with} with pushes, of 200");
+}
+
 #[test]
 fn the_pair_that_excludes_a_target_is_named() {
     let model = robots::arm7();
@@ -162,7 +230,7 @@ fn invalid_limits_are_refused() {
     };
     let good = || DistanceLimits::new(vec![GeometryPair::new(ball("tool", 0.1), obstacle(Vec3::zero(), 0.1))]);
     assert!(refused(DistanceLimits { minimum: f64::NAN, ..good() }).contains("`distances.minimum` is NaN"));
-    assert!(refused(DistanceLimits { rate: 0.0, ..good() }).contains("`distances.rate` is 0"));
+    assert!(refused(DistanceLimits { look_ahead: 0.0, ..good() }).contains("`distances.look_ahead` is 0"));
     assert!(refused(DistanceLimits { range: -1.0, ..good() }).contains("`distances.range` is -1"));
     let pair = GeometryPair::new(ball("nowhere", 0.1), obstacle(Vec3::zero(), 0.1));
     assert!(refused(DistanceLimits::new(vec![pair.clone()])).contains("nowhere"));

@@ -1,4 +1,4 @@
-//! Meshes that an MJCF shows, and its collision shapes; attributes may come from the defaults of classes.
+//! Meshes that an MJCF shows; attributes may come from the defaults of classes.
 
 use super::part::Words;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -20,20 +20,6 @@ pub struct Visual {
     pub color: Option<[f64; 4]>,
 }
 
-/// Collision shape that is fixed to a body.
-pub struct Solid {
-    /// Name of the body; empty for a body without a name.
-    pub body: String,
-    /// Type of the shape: `sphere`, `capsule`, `cylinder`, `box`, `mesh`, or another type of MuJoCo.
-    pub kind: String,
-    /// Numbers of the attribute `size` (m): radius, half length, or half side lengths.
-    pub size: [f64; 3],
-    /// Address and scale of the mesh, for a shape of type `mesh`.
-    pub mesh: Option<(String, [f64; 3])>,
-    /// Pose of the shape in the body (m).
-    pub pose: Isometry3<f64>,
-}
-
 /// First group of collision geometries. By convention, groups from this number on are for collisions.
 const COLLISION: u32 = 3;
 /// Maximum depth of nested bodies or classes.
@@ -50,22 +36,11 @@ struct File<'a> {
     degrees: bool,
     order: &'a str,
     found: Vec<Visual>,
-    solids: Vec<Solid>,
 }
 
 /// Returns the meshes of an MJCF. Files that the MJCF includes are not read.
 pub fn visuals(text: &str) -> Vec<Visual> {
-    read(text).0
-}
-
-/// Returns the collision shapes of an MJCF: shapes of bodies that can touch other shapes. Files that the MJCF includes
-/// are not read.
-pub fn collisions(text: &str) -> Vec<Solid> {
-    read(text).1
-}
-
-fn read(text: &str) -> (Vec<Visual>, Vec<Solid>) {
-    let Ok(document) = Document::parse(text) else { return (Vec::new(), Vec::new()) };
+    let Ok(document) = Document::parse(text) else { return Vec::new() };
     let root = document.root_element();
     let all = |section, tag| {
         let sections = root.children().filter(move |node| node.has_tag_name(section));
@@ -80,7 +55,6 @@ fn read(text: &str) -> (Vec<Visual>, Vec<Solid>) {
         degrees: compiler("angle") != Some("radian"),
         order: compiler("eulerseq").unwrap_or("xyz"),
         found: Vec::new(),
-        solids: Vec::new(),
     };
     for node in root.children().filter(|node| node.has_tag_name("default")) {
         let main = file.classes["main"].clone();
@@ -103,7 +77,7 @@ fn read(text: &str) -> (Vec<Visual>, Vec<Solid>) {
     for world in root.children().filter(|node| node.has_tag_name("worldbody")) {
         file.body(world, None, "main", Isometry3::identity(), 0);
     }
-    (file.found, file.solids)
+    file.found
 }
 
 fn four(text: &str) -> Option<[f64; 4]> {
@@ -160,7 +134,6 @@ impl<'a> File<'a> {
     }
 
     fn geom(&mut self, geom: Node<'a, '_>, body: Option<&'a str>, around: &'a str, pose: Isometry3<f64>) {
-        self.solid(geom, body, around, pose);
         let get = |key| self.attribute(geom, key, around);
         let Some((file, scale)) = get("mesh").and_then(|mesh| self.meshes.get(mesh)) else { return };
         let group = get("group").and_then(|group| group.trim().parse::<u32>().ok()).unwrap_or(0);
@@ -172,29 +145,6 @@ impl<'a> File<'a> {
         let pose = pose * self.pose(&|key| self.attribute(geom, key, around));
         let (file, scale) = (file.clone(), *scale);
         self.found.push(Visual { body: body.map(str::to_owned), file, scale, pose, color });
-    }
-
-    /// Adds the collision shape of a geom, if it can touch other shapes and belongs to a body.
-    fn solid(&mut self, geom: Node<'a, '_>, body: Option<&'a str>, around: &'a str, pose: Isometry3<f64>) {
-        let get = |key| self.attribute(geom, key, around);
-        let touches = |key| get(key).is_none_or(|mask| mask.trim() != "0");
-        let Some(body) = body.filter(|_| touches("contype") || touches("conaffinity")) else { return };
-        let mesh = get("mesh").and_then(|mesh| self.meshes.get(mesh)).cloned();
-        let kind = get("type").unwrap_or(if mesh.is_some() { "mesh" } else { "sphere" });
-        let mut size = [0.0; 3];
-        let mut words = Words::new(get("size").unwrap_or_default());
-        size.iter_mut().for_each(|size| *size = words.number().unwrap_or(0.0));
-        let mut own = self.pose(&|key| self.attribute(geom, key, around));
-        // A shape between two points lies along its axis z.
-        let mut words = Words::new(get("fromto").unwrap_or_default());
-        if let Some((from, to)) = words.numbers().zip(words.numbers()) {
-            let (from, to) = (Vector3::from(from), Vector3::from(to));
-            let turn = UnitQuaternion::rotation_between(&Vector3::z(), &(to - from)).unwrap_or_default();
-            own = Isometry3::from_parts(Translation3::from(0.5 * (from + to)), turn);
-            size[if kind == "box" { 2 } else { 1 }] = 0.5 * (to - from).norm();
-        }
-        let (body, kind) = (body.to_owned(), kind.to_owned());
-        self.solids.push(Solid { body, kind, size, mesh, pose: pose * own });
     }
 
     /// Returns the pose that the attributes of an element describe.
@@ -237,20 +187,7 @@ impl<'a> File<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{collisions, visuals};
-
-    #[test]
-    fn collision_shapes() {
-        let found = collisions(
-            r#"<mujoco><default><default class="foot"><geom type="sphere" size="0.02"/></default></default>
-            <worldbody><geom type="plane"/><body name="one"><geom class="foot" pos="0 0 -0.2"/>
-            <geom type="box" size="1 2 3" contype="0" conaffinity="0"/>
-            <geom type="capsule" size="0.1" fromto="0 0 0 0 0 -2"/></body></worldbody></mujoco>"#,
-        );
-        let seen: Vec<_> =
-            found.iter().map(|s| (&*s.body, &*s.kind, s.size[0], s.size[1], s.pose.translation.z)).collect();
-        assert_eq!(seen, [("one", "sphere", 0.02, 0.0, -0.2), ("one", "capsule", 0.1, 1.0, -1.0)]);
-    }
+    use super::visuals;
 
     #[test]
     fn classes_frames_and_materials() {

@@ -7,6 +7,7 @@ use alloc::borrow::ToOwned;
 use alloc::format;
 use alloc::string::String;
 use condyle_spatial::{Scalar, Se3, Vec3};
+use core::fmt;
 
 /// Solid shape, in its own coordinates (m).
 ///
@@ -270,6 +271,24 @@ impl Geometry {
     }
 }
 
+impl fmt::Display for Geometry {
+    /// Writes the name of the geometry, or its shape and frame if it has no name.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (&*self.name, &self.frame) {
+            ("", Some(frame)) => write!(f, "{} on `{}`", self.shape.kind(), frame.name),
+            ("", None) => write!(f, "{} in the world", self.shape.kind()),
+            (name, _) => write!(f, "`{name}`"),
+        }
+    }
+}
+
+impl fmt::Display for GeometryPair {
+    /// Writes both geometries.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} and {}", self.first, self.second)
+    }
+}
+
 impl GeometryPair {
     /// Returns the pair of two geometries.
     pub fn new(first: Geometry, second: Geometry) -> Self {
@@ -283,19 +302,16 @@ impl GeometryPair {
     /// half-spaces. `index` is the index of the pair in the caller's list; the message contains it.
     pub fn resolve(&self, model: &Model, index: usize) -> Result<[(usize, Se3<f64>); 2], Error> {
         let wrong = |geometry: String, what: String| Error::Geometry { geometry, what };
-        let named = |side: &str, geometry: &Geometry| match &*geometry.name {
-            "" => format!("pairs[{index}].{side}"),
-            name => format!("pairs[{index}].{side} (`{name}`)"),
-        };
+        let named = |side: &str, geometry: &Geometry| format!("pairs[{index}].{side} ({geometry})");
         if self.first.frame.is_none() && self.second.frame.is_none() {
             let what = "has no frame: expected at least one geometry on the robot".to_owned();
-            return Err(wrong(format!("pairs[{index}]"), what));
+            return Err(wrong(format!("pairs[{index}] ({self})"), what));
         }
         let first = self.first.checked(model).map_err(|what| wrong(named("first", &self.first), what))?;
         let second = self.second.checked(model).map_err(|what| wrong(named("second", &self.second), what))?;
         if let (Shape::HalfSpace { .. }, Shape::HalfSpace { .. }) = (self.first.shape, self.second.shape) {
             let what = "has two half-spaces, whose distance is not defined".to_owned();
-            return Err(wrong(format!("pairs[{index}]"), what));
+            return Err(wrong(format!("pairs[{index}] ({self})"), what));
         }
         Ok([first, second])
     }

@@ -4,9 +4,9 @@ use crate::Error;
 use crate::knots::{EFFORT, effort_limits, joint_limits};
 use crate::planner::Planner;
 use crate::policy::Policy;
-use crate::report::Report;
+use crate::report::{Report, TickStatus};
 use crate::settings::{PlanLimits, PlanSettings, check_at_least};
-use condyle_dynamics::{Joint, Model, Se3};
+use condyle_dynamics::{Joint, Model, Motion, Se3, lie};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, GeometryPair, Limit, Residual, Target};
 use condyle_optimal::{InteriorPoint, Problem};
 use std::sync::Arc;
@@ -109,6 +109,29 @@ impl Default for ArmWeights {
 pub struct ArmMpc {
     planner: Planner,
     poses: Vec<f64>,
+    moving: Vec<Moving>,
+    /// Scratch: placements of an obstacle at all knots.
+    placements: Vec<Se3<f64>>,
+}
+
+/// Obstacle that moves with a constant velocity.
+#[derive(Clone, Debug)]
+struct Moving {
+    name: String,
+    /// Time at which the obstacle has its placement (s).
+    time: f64,
+    placement: Se3<f64>,
+    /// Velocity of the origin of the placement, and angular velocity, along the world's axes.
+    velocity: Motion<f64>,
+}
+
+impl Moving {
+    /// Returns the placement at the time t.
+    fn at(&self, t: f64) -> Se3<f64> {
+        let dt = t - self.time;
+        let turn = lie::exp3(self.velocity.angular.scale(dt)).to_rotation();
+        Se3::new(turn * self.placement.rotation, self.placement.translation + self.velocity.linear.scale(dt))
+    }
 }
 
 impl ArmMpc {
@@ -144,7 +167,43 @@ impl ArmMpc {
         let end = end.with_limits(of_states)?;
         let problem = Problem::new(neutral, vec![knot], vec![0; knots], Box::new(end))?;
         let poses = vec![0.0; POSE_SIZE * (knots + 1)];
-        Ok(Self { planner: Planner::new(model, problem, PlanSettings::from(&settings), 0)?, poses })
+        let planner = Planner::new(model, problem, PlanSettings::from(&settings), 0)?;
+        Ok(Self { planner, poses, moving: Vec::new(), placements: Vec::new() })
+    }
+
+    /// Sets the placement of the obstacle called `name` at the time t (s), and its velocity: of the origin of the
+    /// placement, and its angular velocity, along the world's axes. Later ticks plan with the motion at constant
+    /// velocity. A call for each measurement of the obstacle corrects it.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Mat3, Motion, Se3, Vec3, robots};
+    /// use condyle_mpc::{ArmMpc, ArmSettings};
+    /// use condyle_optimal::robot::{Geometry, GeometryPair, Shape};
+    /// let tool = Geometry::on("tool", Shape::sphere([0.0; 3], 0.05));
+    /// let ball = Geometry::in_world(Shape::sphere([0.0; 3], 0.1)).named("ball");
+    /// let settings = ArmSettings { obstacles: vec![GeometryPair::new(tool, ball)], ..ArmSettings::default() };
+    /// let mut mpc = ArmMpc::new(std::sync::Arc::new(robots::arm7()), "tool", settings)?;
+    /// let at = Se3::new(Mat3::identity(), Vec3::new(0.8, 0.5, 0.4));
+    /// mpc.place("ball", 0.0, at, Motion::new(Vec3::new(0.0, -0.3, 0.0), Vec3::zero()))?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a number that is not finite; [`Error::Optimal`] for a matrix that is not a rotation;
+    /// [`Error::Robot`] if no pair of the settings has this obstacle.
+    pub fn place(&mut self, name: &str, t: f64, placement: Se3<f64>, velocity: Motion<f64>) -> Result<(), Error> {
+        Error::check_array("t", &[t], 1)?;
+        Error::check_array("velocity", &velocity.to_array(), 6)?;
+        let all = vec![placement; self.planner.problem.horizon() + 1];
+        if !self.planner.problem.set_placements(name, &all)? {
+            return Err(Error::Robot { what: format!("no pair of the obstacles has a geometry called `{name}`") });
+        }
+        let moving = Moving { name: name.to_owned(), time: t, placement, velocity };
+        match self.moving.iter_mut().find(|moving| moving.name == name) {
+            Some(old) => *old = moving,
+            None => self.moving.push(moving),
+        }
+        Ok(())
     }
 
     /// Begins anew at the time t (s) in the state x = (q, v), whose joints are the posture from which the arm deviates
@@ -154,12 +213,15 @@ impl ArmMpc {
     /// # Errors
     /// [`Error::Argument`] for a number that is not finite; [`Error::Robot`] if no plan is found.
     pub fn reset(&mut self, t: f64, x: &[f64], path: impl FnMut(f64) -> Se3<f64>) -> Result<&Report, Error> {
-        let Self { planner, poses } = self;
+        let Self { planner, poses, moving, placements } = self;
         planner.begin(t, x)?;
         let mut posture = planner.x.clone();
         posture[planner.nq()..].fill(0.0);
         planner.problem.set_references("state", &posture.repeat(planner.times.len()))?;
-        planner.restart(planner.times[0], |planner| refer(planner, poses, path))?;
+        planner.restart(planner.times[0], TickStatus::Planned, |planner| {
+            refer(planner, poses, path)?;
+            place(planner, moving, placements)
+        })?;
         Ok(&self.planner.report)
     }
 
@@ -171,7 +233,7 @@ impl ArmMpc {
     /// [`Error::Argument`] for a state of another length or a time that is not finite; [`Error::Optimal`] for a pose
     /// that is invalid; [`Error::Time`] if t is before the last call.
     pub fn update(&mut self, t: f64, x: &[f64], mut path: impl FnMut(f64) -> Se3<f64>) -> Result<&Report, Error> {
-        let Self { planner, poses } = self;
+        let Self { planner, poses, moving, placements } = self;
         planner.check_time(t)?;
         if !planner.is_started {
             return self.reset(t, x, path);
@@ -182,8 +244,12 @@ impl ArmMpc {
             planner.measured = t;
             planner.move_to(start)?;
             refer(planner, poses, &mut path)?;
+            place(planner, moving, placements)?;
             planner.problem.set_x0(&planner.x)?;
-            planner.tick(false, begin, |planner| refer(planner, poses, path))?;
+            planner.tick(false, begin, |planner| {
+                refer(planner, poses, path)?;
+                place(planner, moving, placements)
+            })?;
         }
         Ok(&self.planner.report)
     }
@@ -209,12 +275,17 @@ impl ArmMpc {
     }
 }
 
+/// Distance beyond the clearance up to which pairs have derivatives (m); longer than the motion in a step of a plan.
+const RANGE: f64 = 0.3;
+
 /// Returns the limit of the distances to obstacles, if there are obstacles.
 fn apart(settings: &ArmSettings) -> Option<Limit> {
     let ArmSettings { obstacles: pairs, clearance, .. } = settings;
     let (count, (linear, quadratic)) = (pairs.len(), DISTANCE_WEIGHTS);
     let (lower, upper) = (vec![*clearance; count], vec![f64::INFINITY; count]);
-    let limit = || Limit::new("obstacles", Residual::Distances { pairs: pairs.clone() }, lower, upper);
+    let limit = || {
+        Limit::new("obstacles", Residual::Distances { pairs: pairs.clone(), range: clearance + RANGE }, lower, upper)
+    };
     (count > 0).then(|| limit().softened(linear, quadratic))
 }
 
@@ -224,6 +295,16 @@ fn refer(planner: &mut Planner, poses: &mut [f64], mut path: impl FnMut(f64) -> 
         Target::Placement(path(t)).write(row);
     }
     planner.problem.set_references(POSE, poses)?;
+    Ok(())
+}
+
+/// Writes the placements of moving obstacles at all knots.
+fn place(planner: &mut Planner, moving: &[Moving], placements: &mut Vec<Se3<f64>>) -> Result<(), Error> {
+    for obstacle in moving {
+        placements.clear();
+        placements.extend(planner.times.iter().map(|&t| obstacle.at(t)));
+        planner.problem.set_placements(&obstacle.name, placements)?;
+    }
     Ok(())
 }
 

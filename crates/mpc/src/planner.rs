@@ -154,10 +154,11 @@ impl Planner {
     }
 
     /// Makes a plan for a horizon that begins at the time `start`, from a robot that stands still in the state
-    /// `self.x`. `refer` writes the references.
+    /// `self.x`. `refer` writes the references. The report then has this `status`.
     pub(crate) fn restart(
         &mut self,
         start: f64,
+        status: TickStatus,
         refer: impl FnOnce(&mut Self) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let begin = Instant::now();
@@ -168,12 +169,12 @@ impl Planner {
         let xs = self.x.repeat(self.times.len());
         let us = self.problem.quasi_static(&xs)?;
         let references = begin.elapsed();
-        let status = self.solver.solve(&mut self.problem, &xs, &us)?.status;
-        if status == Status::NotFinite {
-            return Err(Error::Robot { what: format!("no plan from this state: {status}") });
+        let solved = self.solver.solve(&mut self.problem, &xs, &us)?.status;
+        if solved == Status::NotFinite {
+            return Err(Error::Robot { what: format!("no plan from this state: {solved}") });
         }
         self.is_started = true;
-        self.publish(TickStatus::Restarted, begin, references)
+        self.publish(status, begin, references)
     }
 
     /// Renews the plan from the state `self.x`, after `begin`, when the tick began. `is_prepared` tells whether the
@@ -194,7 +195,7 @@ impl Planner {
             made += 1;
             self.report.iterations = made;
             if !plan.is_executable() {
-                if self.restart(self.times[0], refer).is_err() {
+                if self.restart(self.times[0], TickStatus::Restarted, refer).is_err() {
                     self.report.status = TickStatus::Failed;
                 }
                 return Ok(());

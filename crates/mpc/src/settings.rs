@@ -180,6 +180,7 @@ impl PlanSettings {
         check_above("knot", self.knot)?;
         let is_valid = horizon >= self.knot && horizon / self.knot <= MOST_KNOTS;
         Error::check("horizon", horizon, is_valid, "at least a knot, and at most 1000 knots")?;
+        Error::check("threads", self.threads as f64, (1..=MOST_THREADS).contains(&self.threads), "from 1 to 1024")?;
         Error::check("sweeps", self.sweeps as f64, self.sweeps > 0, "at least 1")?;
         let [least, most] = self.iterations;
         Error::check("iterations", least as f64, least > 0, "at least 1")?;
@@ -198,6 +199,8 @@ impl PlanSettings {
     }
 }
 
+/// Most threads of a solver.
+const MOST_THREADS: usize = 1024;
 /// Most knots of a horizon.
 const MOST_KNOTS: f64 = 1000.0;
 /// Tolerance of the first solve.

@@ -7,7 +7,7 @@ use crate::knots::KnotMaker;
 use crate::planner::Planner;
 use crate::policy::Policy;
 use crate::references::Walk;
-use crate::report::Report;
+use crate::report::{Report, TickStatus};
 use crate::schedule::FootSchedule;
 use crate::settings::PlanSettings;
 use crate::{Error, Foot, Gait, Settings, Terrain};
@@ -124,7 +124,7 @@ impl WholeBodyMpc {
         self.planner.knots = Schedule::new(self.settings().knot, 0)?;
         self.guide.schedule = FootSchedule::new(cycle, self.count(), start + FIRST_STAND);
         self.guide.extend(start, &mut self.planner);
-        self.planner.restart(start, |planner| self.guide.refer(planner))?;
+        self.planner.restart(start, TickStatus::Planned, |planner| self.guide.refer(planner))?;
         Ok(self.complete_report())
     }
 

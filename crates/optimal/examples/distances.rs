@@ -130,7 +130,7 @@ fn main() -> Result<(), Error> {
             let scratch = Mutex::new((Data::new(&model), DMatrix::zeros(6, model.nv())));
             let by_hand = ByHand { model: model.clone(), pairs: pairs.clone(), scratch };
             let kinds = [
-                Residual::Distances { pairs: pairs.iter().map(geometries).collect() },
+                Residual::distances(pairs.iter().map(geometries).collect()),
                 Residual::Own(OwnResidual::autodiff(model.clone(), ByDuals(pairs))),
                 Residual::Own(OwnResidual::new(by_hand)),
             ];

@@ -141,6 +141,14 @@ pub enum Error {
         upper: f64,
     },
 
+    /// A placement of a geometry is not a rotation with a finite translation.
+    #[error("geometry `{name}`, knot {knot}: its placement is not a rotation with a finite translation")]
+    Placement {
+        /// Name of the geometry.
+        name: String,
+        /// Index of the knot.
+        knot: usize,
+    },
     /// A cost term does not fit the robot.
     #[error("cost `{name}`: {what}")]
     Cost {

@@ -180,7 +180,7 @@ fn a_gait_allocates_nothing() {
             quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
             quadratic("com", 1e0, Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) }),
             quadratic("momentum", 1e-3, Residual::CentroidalMomentum { target: Force::zero() }),
-            quadratic("apart", 1e-2, Residual::Distances { pairs: pairs.clone() }),
+            quadratic("apart", 1e-2, Residual::distances(pairs.clone())),
             quadratic("speed", 1e-3, Residual::FrameVelocity { frame: "RF_foot".into(), target, reference }),
         ]
     };
@@ -341,7 +341,7 @@ fn count_of_constrained_solves(change: fn(Limit) -> Limit) {
     let weak = Limit::new("weak", control(), vec![-34.0; 7], vec![34.0; 7]);
     let ball = Geometry::in_world(Shape::sphere([0.5, 0.1, 0.4], 0.1));
     let pair = GeometryPair::new(Geometry::on("tool", Shape::sphere([0.0; 3], 0.05)), ball);
-    let clear = Limit::new("clear", Residual::Distances { pairs: vec![pair] }, vec![0.0], vec![f64::INFINITY]);
+    let clear = Limit::new("clear", Residual::distances(vec![pair]), vec![0.0], vec![f64::INFINITY]);
     let target = Vec3::new(0.35, 0.2, 0.6);
     let reach = Residual::FrameTranslation { frame: "tool".into(), target };
     let (weak, reach) = (change(weak), change(Limit::equality("reach", reach)));

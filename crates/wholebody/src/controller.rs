@@ -17,6 +17,7 @@ use crate::safety::Safety;
 use crate::settings::Settings;
 use crate::task::{Task, TaskKind};
 use crate::task_hierarchy::TaskHierarchy;
+use condyle_dynamics::distances::DistancePairs;
 use condyle_dynamics::{Force, Model, Motion, Vec3, neutral};
 use condyle_linalg::check;
 use std::fmt;
@@ -325,6 +326,12 @@ impl WholeBodyController {
         }
         command.com_acceleration = Vec3::from(rate).scale(1.0 / k.mass) + k.com_drift; // c̈ = J q̈ + J̇ v
         Ok(status)
+    }
+
+    /// Returns the pairs of the limits of distances; `None` without such limits. [`DistancePairs::place`] and
+    /// [`DistancePairs::set_velocity`] move an obstacle.
+    pub fn pairs_mut(&mut self) -> Option<&mut DistancePairs> {
+        self.equations.pairs_mut()
     }
 
     /// Returns the last command; it is zero before the first step.

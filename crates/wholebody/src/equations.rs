@@ -13,6 +13,7 @@ use crate::references::References;
 use crate::separation::Separation;
 use crate::settings::Settings;
 use crate::warm_start::Places;
+use condyle_dynamics::distances::DistancePairs;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::DMatrix;
 
@@ -86,6 +87,11 @@ impl Equations {
             contacts,
             kinematics,
         })
+    }
+
+    /// Returns the pairs of the limits of distances.
+    pub(crate) fn pairs_mut(&mut self) -> Option<&mut DistancePairs> {
+        self.separation.as_mut().map(Separation::pairs_mut)
     }
 
     /// Returns the number of rows with few zeros: of the efforts, and of the distances.

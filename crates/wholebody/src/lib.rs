@@ -76,13 +76,13 @@ mod warm_start;
 #[cfg(feature = "clarabel")]
 pub use clarabel;
 pub use command::{Command, CommandSource};
+pub use condyle_dynamics::distances::DistanceLimits;
 pub use contact::{FrictionContact, Normal, Shape, SurfaceForces};
 pub use controller::WholeBodyController;
 pub use error::{Error, InvalidRotation, Status};
 pub use kkt_residuals::KktResiduals;
 pub use plan::{Plan, PlanData};
 pub use references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};
-pub use separation::DistanceLimits;
 pub use settings::{Backend, Formulation, Friction, JointLimits, Settings};
 pub use task::{Axes, Gains, Task, TaskKind};
 

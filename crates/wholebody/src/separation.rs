@@ -1,60 +1,20 @@
-//! Distances between bodies, as rows of the program.
+//! Distances between bodies, as rows of the program:
+//!
+//! ```text
+//! d̈ = g q̈ + ġ v ≥ −(2 / T) ḋ − (d − d_min) / T²        g = ∂d/∂q,   ḋ = g v + ∂d/∂t
+//! ```
+//!
+//! The velocities of obstacles count as constant. If dynamics, contacts and torques allow no such acceleration, the
+//! bound becomes a task of large weight at that tick.
 
 use crate::cone_program::ConeProgram;
 use crate::error::Error;
 use crate::least_squares::{LeastSquares, dot};
-use condyle_dynamics::distances::{DistancePairs, Distances, GeometryPair};
-use condyle_dynamics::{Data, Model, forward_kinematics, integrate};
+use condyle_dynamics::distances::{DistanceLimits, DistancePairs, Distances};
+use condyle_dynamics::{Data, Model, Motion, Se3, forward_kinematics, integrate, lie};
 
 /// Time by which the robot moves for the difference of two gradients (s).
 const STEP: f64 = 1e-6;
-
-/// Limits of the distances d of pairs of geometries, as bounds on their accelerations:
-///
-/// ```text
-/// d̈ = g q̈ + ġ v ≥ −(2 / T) ḋ − (d − d_min) / T²        g = ∂d/∂q
-/// ```
-///
-/// A distance approaches its minimum no faster than a critically damped spring with time constant T would (an
-/// exponential control barrier function: Nguyen and Sreenath, 2016). The bound is at most a_max, so a pair that is too
-/// near moves apart with at most a_max. If dynamics, contacts and torques allow no such acceleration, the bound becomes
-/// a task of large weight at that tick.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DistanceLimits {
-    /// Pairs of geometries of the robot, or of the robot and its surroundings.
-    pub pairs: Vec<GeometryPair>,
-    /// d_min, the minimum distance (m).
-    pub minimum: f64,
-    /// Look-ahead time T (s); at least the duration of several ticks.
-    pub look_ahead: f64,
-    /// a_max (m/s²).
-    pub max_acceleration: f64,
-    /// Distance above d_min beyond which a pair has no limit (m); above 0.
-    pub range: f64,
-}
-
-impl DistanceLimits {
-    /// Creates limits for these pairs, with a minimum of 1 cm, a look-ahead time of 0.1 s, a maximum acceleration of 50
-    /// m/s² and a range of 20 cm.
-    pub fn new(pairs: Vec<GeometryPair>) -> Self {
-        Self { pairs, minimum: 0.01, look_ahead: 0.1, max_acceleration: 50.0, range: 0.2 }
-    }
-
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        let above = |x: f64| x > 0.0 && x.is_finite();
-        for (name, value, is_valid, allowed) in [
-            ("distances.minimum", self.minimum, self.minimum.is_finite(), "finite"),
-            ("distances.look_ahead", self.look_ahead, above(self.look_ahead), "above 0"),
-            ("distances.max_acceleration", self.max_acceleration, above(self.max_acceleration), "above 0"),
-            ("distances.range", self.range, self.range > 0.0, "above 0"),
-        ] {
-            if !is_valid {
-                return Err(Error::Setting { name, value, allowed });
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Distances of a robot at one state, and the memory for them.
 pub(crate) struct Separation {
@@ -68,6 +28,8 @@ pub(crate) struct Separation {
     q: Vec<f64>,
     /// Lower bound of g q̈ for each pair; −∞ for a pair that is far away.
     bounds: Vec<f64>,
+    /// Scratch: obstacles that move, with their placements.
+    moving: Vec<(usize, Se3<f64>)>,
 }
 
 impl Separation {
@@ -86,6 +48,7 @@ impl Separation {
             step: vec![0.0; model.nv()],
             q: vec![0.0; model.nq()],
             bounds: vec![f64::NEG_INFINITY; pairs.len()],
+            moving: Vec::with_capacity(pairs.geometry_count()),
             pairs,
         })
     }
@@ -95,22 +58,39 @@ impl Separation {
         self.pairs.len()
     }
 
+    /// Returns the pairs, to move obstacles.
+    pub(crate) fn pairs_mut(&mut self) -> &mut DistancePairs {
+        &mut self.pairs
+    }
+
     /// Computes the rows at the state (q, v), and writes them to the program from row `first` on.
     pub(crate) fn write(&mut self, model: &Model, q: &[f64], v: &[f64], program: &mut ConeProgram, first: usize) {
-        let Self { limits, pairs, data, now, after, step, q: moved, bounds } = self;
+        let Self { limits, pairs, data, now, after, step, q: moved, bounds, moving } = self;
         let (T, most) = (limits.look_ahead, limits.max_acceleration);
         pairs.gradients(forward_kinematics(model, data, q), now);
         step.iter_mut().zip(v).for_each(|(step, v)| *step = STEP * v);
         integrate(model, q, step, moved);
+        moving.clear();
+        for geometry in 0..pairs.geometry_count() {
+            let (placement, v) = (pairs.geometry(geometry).placement, pairs.velocity(geometry));
+            if v == Motion::zero() {
+                continue;
+            }
+            moving.push((geometry, placement));
+            let turn = lie::exp3(v.angular.scale(STEP)).to_rotation();
+            let translation = placement.translation + v.linear.scale(STEP);
+            pairs.place(geometry, Se3::new(turn * placement.rotation, translation));
+        }
         pairs.gradients(forward_kinematics(model, data, moved), after);
         let unknowns = program.size.unknowns;
         for (k, bound) in bounds.iter_mut().enumerate() {
             let (g, room) = (now.gradient(k), now.distance(k) - limits.minimum);
             *bound = f64::NEG_INFINITY;
             if now.is_near(k) && room < limits.range {
-                let rate = dot(g, v);
-                // ġ v by a difference; at an edge, where g jumps, it is limited
-                let drift = ((dot(after.gradient(k), v) - rate) / STEP).clamp(-most, most);
+                let rate = dot(g, v) + pairs.rate(now, k);
+                // d̈ at q̈ = 0 by a difference of ḋ; at an edge, where g jumps, it is limited
+                let later = dot(after.gradient(k), v) + pairs.rate(after, k);
+                let drift = ((later - rate) / STEP).clamp(-most, most);
                 *bound = (-2.0 / T * rate - room / (T * T)).min(most) - drift;
             }
             let row = &mut program.row_mut(first + k)[..unknowns];
@@ -118,6 +98,7 @@ impl Separation {
             row[..g.len()].copy_from_slice(g);
             (program.lower[first + k], program.upper[first + k]) = (*bound, f64::INFINITY);
         }
+        moving.iter().for_each(|&(geometry, placement)| pairs.place(geometry, placement));
     }
 
     /// Removes the bounds from the rows of the program. A pair whose bound excludes zero acceleration gets a task of

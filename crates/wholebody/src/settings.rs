@@ -1,8 +1,8 @@
 //! Settings of a controller.
 
 use crate::error::Error;
-use crate::separation::DistanceLimits;
 use crate::task::Gains;
+use condyle_dynamics::distances::DistanceLimits;
 use condyle_dynamics::{Joint, Model};
 use std::fmt;
 
@@ -190,7 +190,9 @@ impl Settings {
                 return Err(Error::Setting { name, value, allowed });
             }
         }
-        self.distances.as_ref().map_or(Ok(()), DistanceLimits::check)?;
+        if let Some((name, value, allowed)) = self.distances.as_ref().and_then(DistanceLimits::wrong) {
+            return Err(Error::Setting { name, value, allowed });
+        }
         let (nq, nv) = (model.nq(), model.nv());
         for (name, numbers, expected, least) in [
             ("effort", &self.effort, nv, None), // `check_effort` checks the numbers

@@ -1,7 +1,7 @@
 //! Limits of distances: an arm around a ball, a limit that is violated at the start, and invalid settings.
 
 use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
-use condyle_dynamics::{Data, Model, Vec3, forward_kinematics, integrate, robots};
+use condyle_dynamics::{Data, Mat3, Model, Motion, Se3, Vec3, forward_kinematics, integrate, robots};
 use condyle_wholebody::{DistanceLimits, Settings, Status, Task, WholeBodyController};
 
 const DT: f64 = 1e-3;
@@ -74,6 +74,49 @@ fn a_pair_that_is_too_near_moves_apart() {
     // the time constant is 0.1 s: after 0.4 s, (1 + 4) e⁻⁴ of the initial error of 86 mm is left
     assert!((distances[400] - (MINIMUM - 0.086 * 5.0 * (-4.0_f64).exp())).abs() < 2e-3, "{}", distances[400]);
     assert!(distances[1000..].iter().all(|d| *d > MINIMUM - 1e-4), "{}", distances[1000]);
+}
+
+/// Checks that the arm yields to a ball that comes nearer, and earlier if the controller knows the ball's velocity.
+#[test]
+fn a_ball_that_comes_nearer_is_avoided() {
+    let arm = robots::arm7();
+    let speed = Vec3::new(0.0, -0.4, 0.0);
+    let least = |is_known: bool| {
+        let (mut q, mut v) = (start(), vec![0.0; 7]);
+        let from = tool(&arm, &q) + Vec3::new(0.0, 0.4, 0.0);
+        let at = |t: f64| Se3::new(Mat3::identity(), from + speed.scale(t));
+        let ball = Geometry::in_world(Shape::sphere(Vec3::zero(), 0.08)).named("ball").at(at(0.0));
+        let pairs = vec![GeometryPair::new(Geometry::on("tool", Shape::sphere(Vec3::zero(), 0.03)), ball)];
+        let mut seen = DistancePairs::new(&arm, &pairs).unwrap();
+        let limits = DistanceLimits { minimum: MINIMUM, ..DistanceLimits::new(pairs) };
+        let settings = Settings { distances: Some(limits), ..Settings::default() };
+        let tasks = [Task::position("tool"), Task { weight: 1e-3, ..Task::posture() }];
+        let mut controller = WholeBodyController::new(&arm, &[], &tasks, settings).unwrap();
+        let references = controller.hold(&q).unwrap();
+        let (mut distances, mut data, mut least) = (Distances::new(&seen), Data::new(&arm), f64::INFINITY);
+        for k in 0..1000 {
+            let t = DT * k as f64;
+            let pairs = controller.pairs_mut().unwrap();
+            let ball = pairs.find("ball").unwrap();
+            pairs.place(ball, at(t));
+            if is_known {
+                pairs.set_velocity(ball, Motion::new(speed, Vec3::zero()));
+            }
+            let command = controller.step(&q, &v, &references);
+            assert_eq!(command.status, Status::Solved);
+            let step: Vec<f64> = v.iter().zip(&command.a).map(|(v, a)| DT * v + 0.5 * DT * DT * a).collect();
+            v.iter_mut().zip(&command.a).for_each(|(v, a)| *v += DT * a);
+            let before = q.clone();
+            integrate(&arm, &before, &step, &mut q);
+            seen.place(seen.find("ball").unwrap(), at(t + DT));
+            seen.values(forward_kinematics(&arm, &mut data, &q), &mut distances);
+            least = least.min(distances.distance(0));
+        }
+        least
+    };
+    let (known, unknown) = (least(true), least(false));
+    assert!(known > MINIMUM - 1e-3, "{known}");
+    assert!(unknown < known - 5e-3, "{unknown} without the velocity, {known} with it");
 }
 
 #[test]

@@ -231,8 +231,21 @@ pub(crate) fn found_type(value: &Bound<'_, PyAny>) -> String {
 /// Reads a pose, given as a homogeneous 4 × 4 matrix.
 pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
     let m = matrix(argument, value, [4, 4])?;
+    check_last_row(argument, &m[12..])?;
     let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
     Ok(Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3)))
+}
+
+/// Largest rounding error in the last row of a pose.
+const LAST_ROW: f64 = 1e-9;
+
+/// Returns an error unless the last row of a pose is (0, 0, 0, 1).
+pub(crate) fn check_last_row(argument: &str, row: &[f64]) -> PyResult<()> {
+    let is_near = |(x, expected): (&f64, f64)| (x - expected).abs() <= LAST_ROW;
+    match row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(is_near) {
+        true => Ok(()),
+        false => Err(PyValueError::new_err(format!("{argument}: expected the last row (0, 0, 0, 1), found {row:?}"))),
+    }
 }
 
 /// Reads a vector of N numbers.

@@ -10,8 +10,8 @@ mod output;
 mod read_only;
 
 pub(crate) use input::{
-    Expected, Input, array, at_once, bounds, check_shape, found_type, in_place, matrix, numbers, pose, rotation,
-    tensor, three, vector,
+    Expected, Input, array, at_once, bounds, check_last_row, check_shape, found_type, in_place, matrix, numbers, pose,
+    rotation, tensor, three, vector,
 };
 pub(crate) use output::{
     Array, Computed, Give, Symmetric, class, destinations, give_named, members, named, named_tuples, output, place,

@@ -3,7 +3,8 @@
 use super::controller::controller;
 use super::policy::JointPolicy;
 use super::settings::{Limits, give_report, read_arm_weights};
-use crate::arrays::{pose, vector};
+use crate::arrays::{array, pose, vector};
+use crate::distances::valid_placement;
 use crate::exceptions::mpc_error;
 use crate::model::Model;
 use crate::optimal::{geometry_pairs, lock};
@@ -94,6 +95,27 @@ controller! { ArmMpc, 0 {
         let nx = robot.nq() + robot.nv();
         let inner = rust::ArmMpc::new(robot, frame, settings).map_err(mpc_error)?;
         Ok(Self { model: model.clone().unbind(), inner: Mutex::new(inner), nx })
+    }
+
+    /// Sets the placement of an obstacle and its velocity. Later ticks plan with its motion at constant velocity. A
+    /// call for each measurement of the obstacle corrects the motion.
+    ///
+    /// name: the name of the `Geometry` in `obstacles`; placement: its pose (4, 4) in the world at the time t (s).
+    /// velocity: [linear, angular], six numbers along the world's axes: the velocity of the origin of the placement
+    ///     (m/s), and the angular velocity (rad/s); None for an obstacle at rest.
+    ///
+    /// Raises `ControllerError` if no pair has this obstacle, or for a number that is not finite.
+    #[pyo3(signature = (name, placement, velocity=None, t=0.0))]
+    fn place(
+        &self,
+        name: &str,
+        placement: &Bound<'_, PyAny>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        t: f64,
+    ) -> PyResult<()> {
+        let placement = valid_placement(placement)?;
+        let velocity = velocity.map(|velocity| array::<6>("velocity", velocity)).transpose()?.unwrap_or_default();
+        lock("controller", &self.inner)?.place(name, t, placement, velocity.into()).map_err(mpc_error)
     }
 
     /// Begins anew in a state, whose joints are the posture from which the arm deviates as little as the path allows.

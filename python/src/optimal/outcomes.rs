@@ -60,5 +60,13 @@ fn give_violation<'py>(py: Python<'py>, row: &rust::Violation) -> PyResult<Bound
         rust::ViolationKind::ControlBound => "control_bound",
         _ => "constraint",
     };
-    class!(py, "Violation")?.call1((kind, row.knot, row.row, row.name.as_deref(), row.entry, row.amount))
+    class!(py, "Violation")?.call1((
+        kind,
+        row.knot,
+        row.row,
+        row.name.as_deref(),
+        row.entry,
+        row.amount,
+        row.what.as_deref(),
+    ))
 }

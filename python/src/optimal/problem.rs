@@ -267,6 +267,30 @@ impl Problem {
         references::set(&self.recorder, &mut *lock("problem", &self.inner)?, name, values)
     }
 
+    /// Sets the placements of a geometry in `Residual.distances`, in costs and limits, at all knots: for example of an
+    /// obstacle that moves while the plan is executed. Call this method between solves.
+    ///
+    /// name: the name of the `Geometry`.
+    /// placements: the poses (N + 1, 4, 4) in the world, or in the frame of the geometry, at the knots 0 … N.
+    ///
+    /// Knots with this geometry get separate costs and limits, which move with the knot in `shift`.
+    ///
+    /// Raises `KeyError` if no pair has this geometry, and `ProblemError` for a placement that is no pose.
+    fn set_placements(&self, name: &str, placements: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.is_outdated.store(true, Ordering::Relaxed);
+        let mut problem = lock("problem", &self.inner)?;
+        let all = references::set_placements(&self.recorder, &mut problem, name, placements)?;
+        let mut described = lock("problem", &self.described)?;
+        let last = described.len() - 1;
+        for (t, placement) in all.into_iter().enumerate() {
+            let model = problem.knot_models().get(t).copied();
+            if let Some(described) = &mut described[model.unwrap_or(last)] {
+                Arc::make_mut(described).place(model.map(|_| t), name, placement);
+            }
+        }
+        Ok(())
+    }
+
     /// Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or
     /// `weighted_barrier`, at all knots. Call this method between solves.
     ///

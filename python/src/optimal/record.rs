@@ -235,6 +235,11 @@ impl<'py> Given<'_, 'py> {
                 to.set_item("values", self.targets(name, values)?)?;
                 "set_references"
             }
+            Call::SetPlacements { name, values } => {
+                to.set_item("name", name)?;
+                to.set_item("placements", self.array(&[knots, 4, 4], values)?)?;
+                "set_placements"
+            }
             Call::SetWeight { name, weight } => {
                 to.set_item("name", name)?;
                 to.set_item("weight", weight)?;

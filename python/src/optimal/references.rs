@@ -2,9 +2,10 @@
 
 use super::recorder::{Recorder, kept};
 use super::robot_action::{Described, change};
-use crate::arrays::{in_place, matrix, output, vector};
+use crate::arrays::{check_last_row, in_place, matrix, output, vector};
 use crate::exceptions::problem_error;
 use condyle::optimal as rust;
+use condyle::{Se3, Vec3, spatial::Mat3};
 use numpy::{Ix2, Ix3};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
@@ -67,6 +68,31 @@ pub(super) fn set(
     match shape {
         [n, 0] => write(&in_place::<Ix2>("values", values, &[rows, n])?),
         [n, m] => write(&in_place::<Ix3>("values", values, &[rows, n, m])?),
+    }
+}
+
+/// Sets the placements of the geometry called `name` at all knots. Returns them.
+pub(super) fn set_placements(
+    recorder: &Recorder,
+    problem: &mut rust::Problem,
+    name: &str,
+    placements: &Bound<'_, PyAny>,
+) -> PyResult<Vec<Se3<f64>>> {
+    let rows = problem.horizon() + 1;
+    let values = in_place::<Ix3>("placements", placements, &[rows, 4, 4])?;
+    let column = |m: &[f64], j: usize| Vec3::new(m[j], m[4 + j], m[8 + j]);
+    let mut all = Vec::with_capacity(rows);
+    for (knot, m) in values.chunks_exact(16).enumerate() {
+        if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+            check_last_row(&format!("placements[{knot}]"), &m[12..])?;
+        }
+        let rotation = Mat3 { x: column(m, 0), y: column(m, 1), z: column(m, 2) };
+        all.push(Se3::new(rotation, column(m, 3)));
+    }
+    recorder.note(|| Call::SetPlacements { name: name.to_owned(), values: kept(&values) });
+    match problem.set_placements(name, &all).map_err(problem_error)? {
+        true => Ok(all),
+        false => Err(PyKeyError::new_err(format!("no pair of distances has a geometry '{name}'"))),
     }
 }
 

@@ -195,6 +195,9 @@ impl Residual {
     /// pairs: a list of pairs of `Sphere`s or `condyle.distances.Geometry`s. At least one geometry of a pair is fixed
     ///     to a frame of the robot; the other one is fixed to the world, or to a frame of the same robot.
     ///
+    /// within: a range r (m), above 0, or None for none: an entry is min(d, r). Pairs that are farther away cost
+    ///     little, and have no derivatives. Give a range well above the bounds and the margin of an activation.
+    ///
     /// A `Limit` or a `Cost` of this residual keeps the geometries apart: if no bounds or activation are given, all
     /// distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
     /// pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
@@ -203,8 +206,10 @@ impl Residual {
     /// >>> tool, ball = Sphere([0.0, 0.0, 0.0], 0.05, "tool"), Sphere([0.4, 0.2, 0.5], 0.1)
     /// >>> clear = Limit("clear", Residual.distances(condyle.robots.arm7(), [(tool, ball)]), lower=[0.01])
     #[staticmethod]
-    fn distances(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>) -> PyResult<Self> {
-        Ok(Self::from(robot::Residual::Distances { pairs: geometry_pairs(model, pairs)? }))
+    #[pyo3(signature = (model, pairs, within=None))]
+    fn distances(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>, within: Option<f64>) -> PyResult<Self> {
+        let range = within.unwrap_or(f64::INFINITY);
+        Ok(Self::from(robot::Residual::Distances { pairs: geometry_pairs(model, pairs)?, range }))
     }
 
     /// Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of the
@@ -359,7 +364,9 @@ impl Residual {
             robot::Residual::FrictionCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::WrenchCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::CenterOfPressure { .. } => Some((vec![f64::NEG_INFINITY; 4], vec![0.0; 4])),
-            robot::Residual::Distances { pairs } => Some((vec![0.0; pairs.len()], vec![f64::INFINITY; pairs.len()])),
+            robot::Residual::Distances { pairs, .. } => {
+                Some((vec![0.0; pairs.len()], vec![f64::INFINITY; pairs.len()]))
+            }
             _ => None,
         }
     }

@@ -4,11 +4,12 @@ use super::residuals::{Residual, put_written, take_written};
 use crate::arrays::{Give, vector};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;
+use condyle::Se3;
 use condyle::optimal as rust;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::ActionModel;
-use rust::robot::{ControlChange, Dynamics, Knot};
+use rust::robot::{ControlChange, Dynamics, GeometryPair, Knot};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -141,6 +142,27 @@ impl Described {
     pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
         let all = self.knot.costs.iter_mut().chain(self.knot.costs_at.values_mut().flatten());
         all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
+    }
+
+    /// Sets the placement of a geometry in the limits of knot t, or in the common limits if t is `None`.
+    pub(super) fn place(&mut self, t: Option<usize>, name: &str, placement: Se3<f64>) {
+        let Knot { limits, limits_at, .. } = &mut self.knot;
+        let of = t.and_then(|t| limits_at.get(&t)).unwrap_or(limits);
+        let has = |pair: &GeometryPair| pair.first.name == name || pair.second.name == name;
+        if !of.iter().any(
+            |limit| matches!(&limit.residual, rust::robot::Residual::Distances { pairs, .. } if pairs.iter().any(has)),
+        ) {
+            return;
+        }
+        let own = match t {
+            Some(t) => limits_at.entry(t).or_insert_with(|| limits.clone()),
+            None => limits,
+        };
+        for limit in own {
+            let rust::robot::Residual::Distances { pairs, .. } = &mut limit.residual else { continue };
+            let geometries = pairs.iter_mut().flat_map(|pair| [&mut pair.first, &mut pair.second]);
+            geometries.filter(|geometry| geometry.name == name).for_each(|geometry| geometry.placement = placement);
+        }
     }
 
     /// Moves the costs and limits of knot t to knot t − 1.

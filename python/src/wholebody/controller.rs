@@ -6,6 +6,7 @@ use super::tasks::Task;
 use super::{references, settings};
 use crate::arrays::{self, Give, class, vector};
 use crate::exceptions::{ControllerError, controller_error};
+use crate::ik::place;
 use crate::model::Model;
 use crate::optimal::lock;
 use condyle::wholebody as rust;
@@ -139,6 +140,24 @@ impl WholeBodyController {
         references::read(references, numbers)?;
         controller.track(&plan.inner, t, numbers);
         references::write(numbers, references)
+    }
+
+    /// Sets the placement of the geometry with a name in the pairs of `DistanceLimits`, for example of an obstacle
+    /// that moves.
+    ///
+    /// name: the name of the `Geometry`.
+    /// placement: the pose (4, 4) in the world, or in the frame of the geometry.
+    /// velocity: the velocity of an obstacle in the world, [linear, angular], six numbers along the world's axes: the
+    ///     velocity of the origin of its placement (m/s), and its angular velocity (rad/s); None for an obstacle at
+    ///     rest.
+    ///
+    /// Raises `ValueError` if no geometry has this name, or if a number is not finite.
+    #[pyo3(signature = (name, placement, velocity=None))]
+    fn place(&self, name: &str, placement: &Bound<'_, PyAny>, velocity: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        match place(lock("controller", &self.inner)?.controller.pairs_mut(), name, placement, velocity)? {
+            true => Ok(()),
+            false => Err(PyValueError::new_err(format!("name: no geometry is named '{name}'"))),
+        }
     }
 
     /// Computes the `Command` at a state. The method always returns a command. If no solution is found, this is a safe

@@ -112,7 +112,7 @@ pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, Py
         let text = serde_json::to_string(&l.pairs).map_err(|error| PyValueError::new_err(error.to_string()))?;
         let pairs = py.import("condyle.distances")?.call_method1("_read_pairs", (text,))?;
         let all = (pairs, l.minimum, l.look_ahead, l.max_acceleration, l.range);
-        class!(py, "condyle._wholebody", "DistanceLimits")?.call1(all)
+        class!(py, "condyle.distances", "DistanceLimits")?.call1(all)
     };
     let all = [
         s.acceleration_weight.give(py, None)?,

@@ -5,12 +5,12 @@ mod page;
 use crate::error::{Error, positive};
 use crate::limits::{check_start, last_frame, start};
 use crate::plan::{Numbers, Show, numbers};
-use crate::robot::{self, Format, ReadingOptions, Robot};
+use crate::robot::{self, ReadingOptions, Robot};
 use crate::terminal::{Table, heading, say, say_json, short};
-use condyle::distances::{Collisions, GeometryPair};
+use condyle::distances::GeometryPair;
 use condyle::ik::{GlobalIk, Outcome, Posture, Rank, SearchSettings};
 use condyle::spatial::{Mat3, lie};
-use condyle::{Data, MjcfOptions, Model, SdfOptions, Se3, UrdfOptions, Vec3, forward_kinematics};
+use condyle::{Data, Model, Se3, Vec3, forward_kinematics};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -107,7 +107,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         Some(Numbers(q)) => return Err(option("q0", format!("expected {} numbers, found {}", model.nq(), q.len()))),
         None => start(model),
     };
-    let pairs = arguments.clearance.map_or_else(|| Ok(Vec::new()), |_| pairs(&robot, &arguments.options))?;
+    let pairs = arguments.clearance.map_or_else(|| Ok(Vec::new()), |_| pairs(&robot))?;
     let settings = SearchSettings {
         tolerance: [arguments.tolerance, ROTATION],
         orientation_weight: if turned { SearchSettings::default().orientation_weight } else { 0.0 },
@@ -162,14 +162,8 @@ fn pose(numbers: &[f64]) -> Result<(Se3<f64>, bool), Error> {
 }
 
 /// Returns the pairs of shapes in the robot's file that can collide.
-fn pairs(robot: &Robot, options: &ReadingOptions) -> Result<Vec<GeometryPair>, Error> {
-    let packages = options.packages.clone();
-    let found = match robot.format {
-        Format::Urdf => Collisions::from_urdf_str(&robot.text, &UrdfOptions { packages, ..UrdfOptions::default() }),
-        Format::Mjcf => Collisions::from_mjcf_str(&robot.text, &MjcfOptions { packages, ..MjcfOptions::default() }),
-        Format::Sdf => Collisions::from_sdf_str(&robot.text, &SdfOptions { packages, ..SdfOptions::default() }),
-    }?;
-    let pairs = found.pairs(&robot.model)?;
+fn pairs(robot: &Robot) -> Result<Vec<GeometryPair>, Error> {
+    let pairs = robot.collisions()?.pairs(&robot.model)?;
     if pairs.is_empty() {
         let what = format!("`{}` has no shapes that can collide; meshes do not count", robot.source);
         return Err(Error::Option { option: "clearance", what });

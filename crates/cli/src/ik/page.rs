@@ -1,6 +1,7 @@
 //! HTML page of a posture: the page of a plan, with a motion from the first posture to the answer.
 
 use super::Answer;
+use crate::apart::Apart;
 use crate::limits::LimitCounts;
 use crate::page::{self, position, shown};
 use crate::scene;
@@ -29,7 +30,7 @@ pub(super) fn write(path: &Path, answer: &Answer) -> std::io::Result<Option<Stri
     difference(model, &answer.start, &answer.posture.q, &mut way);
     let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();
     let (mut positions, mut velocities, mut efforts) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut poses, mut trail) = (Vec::new(), Vec::new());
+    let (mut poses, mut trail, mut apart) = (Vec::new(), Vec::new(), Apart::new(&answer.robot));
     let slowest = |(d, limit): (&f64, &f64)| if *limit > 0.0 { STEEPEST * d.abs() / (SPEED * limit) } else { 0.0 };
     let duration = way.iter().zip(&model.limits().velocity).map(slowest).fold(LEAST, f64::max);
     let dt = duration / KNOTS as f64;
@@ -46,6 +47,9 @@ pub(super) fn write(path: &Path, answer: &Answer) -> std::io::Result<Option<Stri
         velocities.push(shown(model).map(|b| v[b.idx_v]).collect::<Vec<f64>>());
         let placements = forward_kinematics(model, &mut data, &q);
         poses.push((0..model.bodies().len()).map(|i| scene::pose(placements.body(i))).collect::<Vec<_>>());
+        if let Some(apart) = &mut apart {
+            apart.add(placements);
+        }
         trail.push(placements.frame(answer.frame).translation.to_array());
     }
     let (bodies, meshes) = scene::bodies(model, &answer.robot, &[answer.frame], answer.meshes);
@@ -67,7 +71,14 @@ pub(super) fn write(path: &Path, answer: &Answer) -> std::io::Result<Option<Stri
         "tau": efforts,
         "iterations": [],
         "budget": null,
-        "scene": {"bodies": bodies, "meshes": meshes.written(), "poses": poses, "trail": trail},
+        "scene": {
+            "bodies": bodies,
+            "collisions": apart.as_ref().map(Apart::shapes),
+            "meshes": meshes.written(),
+            "poses": poses,
+            "trail": trail,
+        },
+        "apart": apart.as_ref().and_then(Apart::distances),
         "contacts": null,
         "limits": LimitCounts::new(&answer.robot),
         "violations": [],

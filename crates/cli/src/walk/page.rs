@@ -2,6 +2,7 @@
 
 use super::record::Walk;
 use super::walked::Walked;
+use crate::apart::Apart;
 use crate::limits::LimitCounts;
 use crate::page::{self, position, shown};
 use crate::report::Violation;
@@ -20,9 +21,13 @@ pub(crate) fn write(path: &Path, walked: &Walked, violations: &[Violation]) -> s
     let joints = |value: &dyn Fn(&condyle::tree::Body) -> f64| -> Vec<f64> { shown(model).map(value).collect() };
     let mut data = Data::new(model);
     let (mut poses, mut trails) = (Vec::new(), vec![Vec::new(); walked.feet.len()]);
+    let mut apart = Apart::new(robot);
     for x in &walk.states {
         let placements = forward_kinematics(model, &mut data, &x[..nq]);
         poses.push((0..model.bodies().len()).map(|i| scene::pose(placements.body(i))).collect::<Vec<_>>());
+        if let Some(apart) = &mut apart {
+            apart.add(placements);
+        }
         for (trail, foot) in trails.iter_mut().zip(&walked.feet) {
             let mut point = placements.frame(foot.frame).translation;
             point.z -= foot.height();
@@ -44,7 +49,14 @@ pub(crate) fn write(path: &Path, walked: &Walked, violations: &[Violation]) -> s
         "tau": walk.efforts[..count].iter().map(|tau| joints(&|b| tau[b.idx_v])).collect::<Vec<_>>(),
         "iterations": [],
         "budget": budget(walked),
-        "scene": {"bodies": bodies, "meshes": meshes.written(), "poses": poses, "follow": 1},
+        "scene": {
+            "bodies": bodies,
+            "collisions": apart.as_ref().map(Apart::shapes),
+            "meshes": meshes.written(),
+            "poses": poses,
+            "follow": 1,
+        },
+        "apart": apart.as_ref().and_then(Apart::distances),
         "contacts": contacts(walked, &trails),
         "limits": LimitCounts::new(robot),
         "violations": violations,

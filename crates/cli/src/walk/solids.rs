@@ -1,9 +1,9 @@
 //! Collision shapes of a robot's bodies, as sets of points with a radius.
 
-use crate::robot::{Format, Robot};
-use crate::visuals::{self, Geometry};
+use crate::robot::Robot;
+use condyle::distances::{CollisionMesh, Shape};
 use condyle::{Model, Se3, Vec3, spatial::Act};
-use condyle_meshes::{Format as MeshFormat, Places, mjcf, triangles};
+use condyle_meshes::{Format as MeshFormat, Places, triangles};
 use core::f64::consts::TAU;
 
 /// Number of points on the rim of a cylinder.
@@ -28,32 +28,16 @@ impl Solid {
 
 /// Returns the collision shapes in a robot's file. Shapes that cannot be read are left out.
 pub(crate) fn read(model: &Model, robot: &Robot) -> Vec<Solid> {
-    let solids = match robot.format {
-        Format::Urdf => visuals::collisions(&robot.text).into_iter().filter_map(|shape| {
-            let (points, radius) = hull(&shape.geometry, &robot.places)?;
-            solid(model, &shape.link, shape.origin, points, radius)
-        }),
-        Format::Mjcf | Format::Sdf => return of_mjcf(model, robot),
-    };
-    solids.collect()
-}
-
-/// Returns the collision shapes of an MJCF. An SDF has none.
-fn of_mjcf(model: &Model, robot: &Robot) -> Vec<Solid> {
-    let shapes = if robot.format == Format::Mjcf { mjcf::collisions(&robot.text) } else { Vec::new() };
-    let read = |shape: mjcf::Solid| {
-        let geometry = match (&*shape.kind, shape.mesh) {
-            ("mesh", Some((file, scale))) => Geometry::Mesh { file, scale },
-            ("sphere", _) => Geometry::Sphere(shape.size[0]),
-            ("capsule", _) => Geometry::Capsule { radius: shape.size[0], length: 2.0 * shape.size[1] },
-            ("cylinder", _) => Geometry::Cylinder { radius: shape.size[0], length: 2.0 * shape.size[1] },
-            ("box", _) => Geometry::Box(shape.size.map(|half| 2.0 * half)),
-            _ => return None,
-        };
-        let (points, radius) = hull(&geometry, &robot.places)?;
-        solid(model, &shape.body, Se3::from(shape.pose), points, radius)
-    };
-    shapes.into_iter().filter_map(read).collect()
+    let Ok(collisions) = robot.collisions() else { return Vec::new() };
+    let shapes = collisions.geometries.iter().filter_map(|geometry| {
+        let (points, radius) = hull(&geometry.shape)?;
+        solid(model, &geometry.frame.as_ref()?.name, geometry.placement, points, radius)
+    });
+    let meshes = collisions.meshes().filter_map(|mesh| {
+        let points = points(mesh, &robot.places)?;
+        solid(model, &mesh.frame.name, mesh.placement, points, 0.0)
+    });
+    shapes.chain(meshes).collect()
 }
 
 /// Returns a shape whose points are given in a frame of a link.
@@ -64,29 +48,32 @@ fn solid(model: &Model, link: &str, pose: Se3<f64>, points: Vec<Vec3<f64>>, radi
     Some(Solid { body: frame.body, link: link.to_owned(), points, radius })
 }
 
-/// Returns points whose hull, enlarged by the radius, is the shape.
-fn hull(geometry: &Geometry, places: &Places) -> Option<(Vec<Vec3<f64>>, f64)> {
-    let on_axis = |z: f64| vec![Vec3::new(0.0, 0.0, -z), Vec3::new(0.0, 0.0, z)];
-    Some(match *geometry {
-        Geometry::Sphere(radius) => (vec![Vec3::zero()], radius),
-        Geometry::Capsule { radius, length } => (on_axis(0.5 * length), radius),
-        Geometry::Box([x, y, z]) => {
-            let sign = |k: usize, bit: usize| if k & bit == 0 { -0.5 } else { 0.5 };
-            ((0..8).map(|k| Vec3::new(x * sign(k, 1), y * sign(k, 2), z * sign(k, 4))).collect(), 0.0)
+/// Returns points whose hull, enlarged by the radius, is the shape. A capsule that contains an ellipsoid takes its
+/// place. A half-space has no such points.
+fn hull(shape: &Shape) -> Option<(Vec<Vec3<f64>>, f64)> {
+    Some(match *shape {
+        Shape::Sphere { center, radius } => (vec![center], radius),
+        Shape::Capsule { ends, radius } => (ends.to_vec(), radius),
+        Shape::Box { half_sizes: h } => {
+            let sign = |k: usize, bit: usize| if k & bit == 0 { -1.0 } else { 1.0 };
+            ((0..8).map(|k| Vec3::new(h.x * sign(k, 1), h.y * sign(k, 2), h.z * sign(k, 4))).collect(), 0.0)
         }
-        Geometry::Cylinder { radius, length } => {
+        Shape::Cylinder { radius, half_length } => {
             let rim = |k: usize| {
                 let (sin, cos) = (TAU * (k / 2) as f64 / RIM as f64).sin_cos();
-                let z = if k.is_multiple_of(2) { 0.5 * length } else { -0.5 * length };
-                Vec3::new(radius * cos, radius * sin, z)
+                Vec3::new(radius * cos, radius * sin, if k.is_multiple_of(2) { half_length } else { -half_length })
             };
             ((0..2 * RIM).map(rim).collect(), 0.0)
         }
-        Geometry::Mesh { ref file, scale } => {
-            let path = places.find(file).ok()?;
-            let (points, _) = triangles(MeshFormat::of(&path)?, &std::fs::read(path).ok()?).ok()?;
-            let scaled = |p: [f64; 3]| Vec3::new(p[0] * scale[0], p[1] * scale[1], p[2] * scale[2]);
-            (points.into_iter().map(scaled).collect(), 0.0)
-        }
+        Shape::Ellipsoid { .. } => return hull(&shape.containing_capsule()),
+        _ => return None,
     })
+}
+
+/// Returns the points of a mesh in the frame of its shape; `None` if it cannot be read.
+fn points(mesh: &CollisionMesh, places: &Places) -> Option<Vec<Vec3<f64>>> {
+    let path = places.find(&mesh.file).ok()?;
+    let (points, _) = triangles(MeshFormat::of(&path)?, &std::fs::read(path).ok()?).ok()?;
+    let [x, y, z] = mesh.scale;
+    Some(points.into_iter().map(|p| Vec3::new(p[0] * x, p[1] * y, p[2] * z)).collect())
 }

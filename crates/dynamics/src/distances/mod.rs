@@ -46,6 +46,7 @@ mod box_pair;
 mod boxes;
 mod curved;
 mod lanes;
+mod limits;
 mod pairs;
 #[doc(hidden)]
 pub mod prepared;
@@ -58,5 +59,6 @@ pub use condyle_model::Fit;
 #[cfg(feature = "loaders")]
 pub use condyle_model::{CollisionMesh, Collisions};
 pub use condyle_model::{FrameName, Geometry, GeometryPair, Shape};
+pub use limits::DistanceLimits;
 pub use pairs::{DistancePairs, Replacement};
 pub use results::Distances;

@@ -9,7 +9,7 @@ use crate::passes::frames::Placements;
 use alloc::vec::Vec;
 use condyle_linalg::{check, check_index};
 use condyle_model::{Error, Geometry, GeometryPair, Model, Shape};
-use condyle_spatial::{Act, Force, Se3, Vec3};
+use condyle_spatial::{Act, Force, Motion, Se3, Vec3};
 
 /// Geometry of a pair that is replaced by a capsule, because the exact distance of the pair is not available.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,9 +41,16 @@ pub(crate) struct Placed {
     bound: (Vec3<f64>, f64),
     /// Whether a pair needs the shape in the world, and not only the row of a sphere or capsule.
     is_general: bool,
+    /// Velocity of the shape's origin, and angular velocity, along the world's axes; 0 on the robot.
+    velocity: Motion<f64>,
 }
 
 impl Placed {
+    /// Returns the geometry as the caller gave it, the shape that is used, and the pose of the geometry's frame.
+    pub(super) fn parts(&self) -> (&Geometry, Shape, Se3<f64>) {
+        (&self.geometry, self.shape, self.frame)
+    }
+
     /// Gives the shape a pose in the geometry's frame.
     fn place(&mut self, placement: Se3<f64>) {
         self.geometry.placement = placement;
@@ -138,17 +145,13 @@ impl DistancePairs {
                 geometries[side] = all.add(geometry, shape, body, turned * pose);
             }
             let begin = all.path.len();
-            all.add_path(model, [first.0, second.0]);
-            let method = match geometries.map(|g| all.geometries[g].solid) {
-                [Solid::Sphere(_), Solid::Sphere(_)] => Method::Spheres,
-                [Solid::Sphere(_) | Solid::Capsule(_), Solid::Sphere(_) | Solid::Capsule(_)] => Method::Capsules,
-                _ => Method::Other,
-            };
+            add_path(model, [first.0, second.0], &mut all.path);
             let [a, b] = geometries;
+            let method = Method::of(&all.geometries[a].solid, &all.geometries[b].solid);
             match method {
                 Method::Spheres => all.spheres.push(item(pair, a, b)),
                 Method::Capsules => all.capsules.push(item(pair, a, b)),
-                Method::Other => {
+                Method::Plane | Method::Other => {
                     all.others.push(pair);
                     all.geometries[a].is_general = true;
                     all.geometries[b].is_general = true;
@@ -176,23 +179,12 @@ impl DistancePairs {
             solid: Solid::new(&shape, &pose),
             bound: (Vec3::zero(), 0.0),
             is_general: false,
+            velocity: Motion::zero(),
         };
         let (center, radius) = shape.bounding_sphere();
         placed.bound = (pose.act(center), radius);
         self.geometries.push(placed);
         self.geometries.len() - 1
-    }
-
-    /// Adds the columns between two bodies. A column that moves both bodies does not change their distance.
-    fn add_path(&mut self, model: &Model, bodies: [usize; 2]) {
-        let supports = bodies.map(|body| model.support(&model.nodes()[body]));
-        for (side, sign) in [(0, 1.0), (1, -1.0)] {
-            for &c in supports[side].iter().filter(|c| !supports[1 - side].contains(c)) {
-                let column = &model.columns()[c];
-                let ratio = sign * column.ratio;
-                self.path.push(PathColumn { column: c, coordinate: column.coordinate, ratio });
-            }
-        }
     }
 
     /// Adds the signs of the columns between two bodies, unless `rows` already contains the bodies.
@@ -292,6 +284,64 @@ impl DistancePairs {
         let finite = rotation.is_rotation() && translation.to_array().iter().all(|x| x.is_finite());
         assert!(finite, "placement: expected a rotation and a finite translation, found {placement:?}");
         self.geometries[geometry].place(placement);
+    }
+
+    /// Sets the velocity of a geometry that is fixed to the world: the linear velocity of the origin of its placement
+    /// and its angular velocity, along the world's axes (m/s, rad/s). [`rate`](Self::rate) uses it. The placement stays
+    /// until [`place`](Self::place) changes it.
+    ///
+    /// ```
+    /// use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
+    /// use condyle_dynamics::{Data, Motion, Vec3, forward_kinematics, robots};
+    /// let arm = robots::arm7();
+    /// let tool = Geometry::on("tool", Shape::sphere([0.0; 3], 0.05));
+    /// let floor = Shape::HalfSpace { normal: Vec3::new(0.0, 0.0, 1.0), offset: 0.0 };
+    /// let lift = Geometry::in_world(floor).named("lift");
+    /// let mut pairs = DistancePairs::new(&arm, &[GeometryPair::new(tool, lift)])?;
+    /// pairs.set_velocity(pairs.find("lift").unwrap(), Motion::new(Vec3::new(0.0, 0.0, 0.2), Vec3::zero()));
+    /// let mut distances = Distances::new(&pairs);
+    /// pairs.values(forward_kinematics(&arm, &mut Data::new(&arm), &[0.3; 7]), &mut distances);
+    /// assert!((pairs.rate(&distances, 0) + 0.2).abs() < 1e-15); // the floor comes nearer
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// Panics if the geometry does not exist or is on the robot, or if a number is not finite.
+    #[track_caller]
+    pub fn set_velocity(&mut self, geometry: usize, velocity: Motion<f64>) {
+        check_index("geometry", geometry, self.geometries.len(), "geometries");
+        let placed = &mut self.geometries[geometry];
+        assert!(placed.geometry.frame.is_none(), "geometry {}: expected a geometry in the world", placed.geometry);
+        let is_finite = velocity.to_array().iter().all(|x| x.is_finite());
+        assert!(is_finite, "velocity: expected finite numbers, found {velocity:?}");
+        placed.velocity = velocity;
+    }
+
+    /// Returns the velocity of a geometry; 0 unless [`set_velocity`](Self::set_velocity) set it.
+    ///
+    /// # Panics
+    /// Panics if the geometry does not exist.
+    #[track_caller]
+    pub fn velocity(&self, geometry: usize) -> Motion<f64> {
+        check_index("geometry", geometry, self.geometries.len(), "geometries");
+        self.geometries[geometry].velocity
+    }
+
+    /// Returns ∂d/∂t, the derivative of the distance of a pair by time while the robot stands still (m/s). It follows
+    /// from the [velocities](Self::set_velocity) of obstacles: d' = ∂d/∂q v + ∂d/∂t. `distances` are the results of
+    /// the last evaluation.
+    ///
+    /// # Panics
+    /// Panics if the pair does not exist.
+    #[track_caller]
+    pub fn rate(&self, distances: &Distances, pair: usize) -> f64 {
+        check_index("pair", pair, self.pairs.len(), "pairs");
+        let (geometries, points) = (self.pairs[pair].geometries, distances.points(pair));
+        let velocity = |side: usize| {
+            let Placed { geometry, velocity, .. } = &self.geometries[geometries[side]];
+            velocity.linear + velocity.angular.cross(points[side] - geometry.placement.translation)
+        };
+        distances.normal(pair).dot(velocity(0) - velocity(1)) // n·(ṗ₁ − ṗ₂)
     }
 
     /// Sets the largest distance of interest (m); infinite at first. Pairs whose bounding spheres are farther apart are
@@ -407,7 +457,7 @@ impl DistancePairs {
                         back -= 1;
                         items[back] = item(k, a, b);
                     }
-                    (None, Method::Other) => found[k] = row_of(&distance(&solids[a].0, &solids[b].0)),
+                    (None, Method::Plane | Method::Other) => found[k] = row_of(&distance(&solids[a].0, &solids[b].0)),
                 }
             }
             lanes::compute(&items[..front], rounds, true, found);
@@ -428,6 +478,17 @@ impl DistancePairs {
         let length = norm(d);
         let witness = Witness { distance: length, points: [p, q], normal: d.scale(1.0 / length) };
         Some(witness.enlarged(radius, its))
+    }
+}
+
+/// Appends the columns between two bodies to `path`. A column that moves both bodies does not change their distance.
+pub(super) fn add_path(model: &Model, bodies: [usize; 2], path: &mut Vec<PathColumn>) {
+    let supports = bodies.map(|body| model.support(&model.nodes()[body]));
+    for (side, sign) in [(0, 1.0), (1, -1.0)] {
+        for &c in supports[side].iter().filter(|c| !supports[1 - side].contains(c)) {
+            let column = &model.columns()[c];
+            path.push(PathColumn { column: c, coordinate: column.coordinate, ratio: sign * column.ratio });
+        }
     }
 }
 

@@ -11,7 +11,9 @@
 use crate::common::{all_models, normal3, random_pose, random_rotation, rng};
 use crate::counting::allocations;
 use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
-use condyle_dynamics::{Act, Data, Error, Mat3, Model, Se3, Vec3, forward_kinematics, integrate, neutral, robots};
+use condyle_dynamics::{
+    Act, Data, Error, Mat3, Model, Motion, Se3, Vec3, forward_kinematics, integrate, lie, neutral, robots,
+};
 use nalgebra::DMatrix;
 use rand::RngExt;
 use rand::rngs::StdRng;
@@ -381,6 +383,41 @@ fn replaced_shapes_are_reported() {
     }
 }
 
+/// Checks the rate ∂d/∂t of obstacles that move and turn against differences of distances.
+#[test]
+fn rates_are_differences() {
+    const STEP: f64 = 1e-6;
+    let (arm, mut random) = (robots::arm7(), rng(8));
+    let (mut data, mut compared) = (Data::new(&arm), 0);
+    for trial in 0..200 {
+        let part = Geometry::on("tool", random_shape(trial % 3, &mut random));
+        let pose = random_pose(&mut random);
+        let obstacle = Geometry::in_world(random_shape(trial / 3 % 3, &mut random)).named("obstacle").at(pose);
+        let sides = if trial % 2 == 0 { [part, obstacle] } else { [obstacle, part] };
+        let [first, second] = sides;
+        let mut pairs = DistancePairs::new(&arm, &[GeometryPair::new(first, second)]).unwrap();
+        let (geometry, mut found) = (pairs.find("obstacle").unwrap(), Distances::new(&pairs));
+        let velocity = Motion::new(normal3(&mut random), normal3(&mut random));
+        let placements = forward_kinematics(&arm, &mut data, &[0.3; 7]);
+        let mut distance = |pairs: &mut DistancePairs, dt: f64| {
+            let turn = lie::exp3(velocity.angular.scale(dt)).to_rotation();
+            pairs.place(geometry, Se3::new(turn * pose.rotation, pose.translation + velocity.linear.scale(dt)));
+            pairs.values(placements, &mut found);
+            (found.distance(0), pairs.rate(&found, 0), found.normal(0))
+        };
+        assert_eq!(distance(&mut pairs, 0.0).1, 0.0); // at rest
+        pairs.set_velocity(geometry, velocity);
+        let [before, now, after] = [-STEP, 0.0, STEP].map(|dt| distance(&mut pairs, dt));
+        if (before.2 - after.2).norm_squared() > 1e-6 {
+            continue; // the nearest points jump between two edges
+        }
+        let difference = (after.0 - before.0) / (2.0 * STEP);
+        assert!((difference - now.1).abs() < 1e-6 * (1.0 + now.1.abs()), "trial {trial}: {difference}, {}", now.1);
+        compared += 1;
+    }
+    assert!(compared > 180, "{compared}");
+}
+
 #[test]
 fn wrong_geometries_are_refused() {
     let arm = robots::arm7();
@@ -393,22 +430,21 @@ fn wrong_geometries_are_refused() {
     let text = said(world(Shape::cuboid([1.0, -0.1, 0.2])).named("crate"), good());
     assert_eq!(text, "pairs[0].first (`crate`): half_sizes is -0.1, expected at least 0");
     let text = said(good(), world(Shape::Ellipsoid { radii: Vec3::new(0.1, 0.0, 0.1) }));
-    assert_eq!(text, "pairs[0].second: radii holds 0, expected more than 0");
+    assert_eq!(text, "pairs[0].second (ellipsoid in the world): radii holds 0, expected more than 0");
     let text = said(good(), world(Shape::HalfSpace { normal: Vec3::new(0.0, 0.0, 2.0), offset: 0.0 }));
-    assert_eq!(text, "pairs[0].second: normal has the length 2, expected a unit vector");
+    assert_eq!(text, "pairs[0].second (half-space in the world): normal has the length 2, expected a unit vector");
     let text = said(good(), world(Shape::capsule([f64::NAN, 0.0, 0.0], [0.0; 3], 0.1)));
-    assert_eq!(text, "pairs[0].second: ends holds a NaN");
-    assert_eq!(
-        said(world(Shape::sphere([0.0; 3], 0.1)), world(Shape::sphere([0.0; 3], 0.1))),
-        "pairs[0]: has no frame: expected at least one geometry on the robot"
-    );
+    assert_eq!(text, "pairs[0].second (capsule in the world): ends holds a NaN");
+    let text = said(world(Shape::sphere([0.0; 3], 0.1)), world(Shape::sphere([0.0; 3], 0.1)));
+    assert!(text.starts_with("pairs[0] (sphere in the world and sphere in the world): "), "{text}");
+    assert!(text.ends_with("has no frame: expected at least one geometry on the robot"), "{text}");
     let floor = Shape::HalfSpace { normal: Vec3::new(0.0, 0.0, 1.0), offset: 0.0 };
-    assert_eq!(
-        said(Geometry::on("tool", floor), world(floor)),
-        "pairs[0]: has two half-spaces, whose distance is not defined"
-    );
+    let text = said(Geometry::on("tool", floor), world(floor));
+    assert!(text.starts_with("pairs[0] (half-space on `tool` and half-space in the world): "), "{text}");
+    assert!(text.ends_with("has two half-spaces, whose distance is not defined"), "{text}");
     let scaled = Se3::new(Mat3::identity().scale(2.0), Vec3::zero());
-    assert_eq!(said(good().at(scaled), good()), "pairs[0].first: placement.rotation is not a rotation matrix");
+    let text = said(good().at(scaled), good());
+    assert_eq!(text, "pairs[0].first (sphere on `tool`): placement.rotation is not a rotation matrix");
     let text = said(Geometry::on("tol", Shape::sphere([0.0; 3], 0.1)), good());
-    assert!(text.starts_with("pairs[0].first: frame: unknown frame `tol`"), "{text}");
+    assert!(text.starts_with("pairs[0].first (sphere on `tol`): frame: unknown frame `tol`"), "{text}");
 }

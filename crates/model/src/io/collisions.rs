@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::frame_name::FrameName;
 use crate::geometry::{Geometry, GeometryPair, Shape};
 use crate::model::Model;
+use crate::names::nearest;
 use crate::warning::Warning;
 use condyle_spatial::Se3;
 use std::collections::HashSet;
@@ -145,8 +146,29 @@ impl Collisions {
         self.masks.push((name, masks));
     }
 
-    /// Removes all pairs of geometries on two links.
-    pub fn disable(&mut self, first: &str, second: &str) {
+    /// Removes all pairs of geometries on two links; `world` is the link of the world.
+    ///
+    /// # Errors
+    /// Returns [`Error::Geometry`] for a link that has neither a shape nor a mesh.
+    pub fn disable(&mut self, first: &str, second: &str) -> Result<(), Error> {
+        let of = |frame: &Option<FrameName>| frame.as_ref().map_or_else(|| WORLD.to_owned(), |f| f.name.clone());
+        let shapes = self.geometries.iter().map(|geometry| of(&geometry.frame));
+        let links: Vec<String> = shapes.chain(self.meshes().map(|mesh| mesh.frame.name.clone())).collect();
+        for link in [first, second] {
+            if link != WORLD && !links.iter().any(|other| other == link) {
+                let near = nearest(link, links.iter().map(String::as_str));
+                let near =
+                    if near.is_empty() { near } else { format!("; the most similar link with shapes is `{near}`") };
+                let what = format!("has no collision shapes{near}");
+                return Err(Error::Geometry { geometry: format!("link `{link}`"), what });
+            }
+        }
+        self.leave_apart(first, second);
+        Ok(())
+    }
+
+    /// Removes all pairs of geometries on two links, which need not have shapes.
+    pub(crate) fn leave_apart(&mut self, first: &str, second: &str) {
         let mut links = [first.to_owned(), second.to_owned()];
         links.sort_unstable();
         self.disabled.insert(links);
@@ -175,7 +197,7 @@ impl Collisions {
         let mut all = Vec::new();
         for geometry in &self.geometries {
             let (body, _) = geometry.resolve(model)?;
-            let link = geometry.frame.as_ref().map_or("world", |frame| &*frame.name);
+            let link = geometry.frame.as_ref().map_or(WORLD, |frame| &*frame.name);
             let masks = self.masks.iter().find(|(name, _)| *name == geometry.name).map_or([1, 1], |&(_, masks)| masks);
             all.push((geometry, body, link, masks));
         }
@@ -195,7 +217,7 @@ impl Collisions {
         let mut pairs = Vec::new();
         for (i, &(a, first, link, [type_1, affinity_1])) in all.iter().enumerate() {
             for (j, &(b, second, other, [type_2, affinity_2])) in all.iter().enumerate().skip(i + 1) {
-                let fixed_to_world = |body: usize, link: &str| body == 0 && link != "world";
+                let fixed_to_world = |body: usize, link: &str| body == 0 && link != WORLD;
                 let adjacent = first == second
                     || parents[i] == second && (second > 0 || fixed_to_world(second, other))
                     || parents[j] == first && (first > 0 || fixed_to_world(first, link));
@@ -211,6 +233,9 @@ impl Collisions {
         Ok(pairs)
     }
 }
+
+/// Link of geometries that are fixed to the world.
+const WORLD: &str = "world";
 
 /// Returns the warning that a shape of a link is left out.
 fn left_out(element: &Element, link: &str, what: &str) -> Warning {

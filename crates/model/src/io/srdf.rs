@@ -152,7 +152,7 @@ impl Collisions {
             return Err(element.wrong("is not supported: only <disable_collisions> is"));
         }
         for element in root.all("disable_collisions") {
-            self.disable(text(element, "link1")?, text(element, "link2")?);
+            self.leave_apart(text(element, "link1")?, text(element, "link2")?);
         }
         Ok(())
     }

@@ -56,13 +56,25 @@ impl ScaledRows {
         &mut self.rows[first..][..self.stride]
     }
 
-    /// Sets the slopes and the curvature of the last rows.
+    /// Sets the slopes and the curvature of the last rows, which are combined.
     fn set_terms<const N: usize>(&mut self, slopes: &[f64], curvature: &[[f64; N]]) {
         let first = (self.count - slopes.len()) * self.stride;
         let rows = View::new(&self.rows[first..self.count * self.stride], self.stride);
         add_scaled_product(&mut self.slope, 1.0, rows, slopes);
         for (scaled, factors) in self.scaled[first..].chunks_exact_mut(self.stride).zip(curvature) {
             add_scaled_product(scaled, 1.0, rows, &factors[..slopes.len()]);
+        }
+    }
+
+    /// Sets the slope and the curvature of the last row.
+    fn set_last_terms(&mut self, [slope, curvature]: [f64; 2]) {
+        let (first, columns) = ((self.count - 1) * self.stride, self.columns.clone());
+        let row = &self.rows[first..][columns.clone()];
+        for (sum, entry) in self.slope[columns.clone()].iter_mut().zip(row) {
+            *sum += slope * entry;
+        }
+        for (scaled, entry) in self.scaled[first..][columns].iter_mut().zip(row) {
+            *scaled = curvature * entry;
         }
     }
 
@@ -148,7 +160,7 @@ impl RowTerms<'_> {
                 continue;
             }
             columns.push_run(first, entries, scratch);
-            scratch.set_terms(&[slope], &[[curvature]]);
+            scratch.set_last_terms([slope, curvature]);
         }
         for group in knot.rows.groups() {
             add_group(&group, &terms[group.rows.clone()], columns, H, ld, scratch);

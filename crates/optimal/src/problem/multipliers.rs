@@ -86,6 +86,8 @@ pub(crate) struct Part {
     pub(crate) of_state: bool,
     /// Cost of values outside the bounds, if the group may give way.
     pub(crate) soft: Option<Soft>,
+    /// Description of each row, if the rows have one: the geometries of a pair.
+    pub(crate) rows: Arc<[Arc<str>]>,
 }
 
 /// Function that is called with the constraints of a knot.

@@ -5,7 +5,7 @@ use super::solver::{RecordedSolver, SolverSettings};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::robot::{Cost, Knot};
-use condyle_dynamics::{ContactConstraint, Motion, Se3};
+use condyle_dynamics::{ContactConstraint, Mat3, Motion, Se3, Vec3};
 use serde::{Deserialize, Serialize};
 
 /// Call that changes a problem or its solver, with all arguments. Each call is named after its function.
@@ -23,6 +23,13 @@ pub enum Call {
         /// Name of the cost.
         name: String,
         /// Targets of all knots.
+        values: Numbers,
+    },
+    /// Call of [`Problem::set_placements`].
+    SetPlacements {
+        /// Name of the geometry.
+        name: String,
+        /// Placements of all knots: for each the homogeneous matrix, row by row.
         values: Numbers,
     },
     /// Change of the weight of a cost at all knots, by [`Problem::change_costs`].
@@ -194,6 +201,10 @@ impl Call {
         match self {
             Self::SetX0 { x0 } => problem.set_x0(x0),
             Self::SetReferences { name, values } => problem.set_references(name, values).map(drop),
+            Self::SetPlacements { name, values } => {
+                let placements: Vec<_> = values.chunks(16).map(placement).collect();
+                problem.set_placements(name, &placements).map(drop)
+            }
             Self::SetWeight { name, weight } => problem.change_costs(name, |cost| cost.set_weight(*weight)).map(drop),
             Self::SetWeights { name, weights } => problem.set_weights(name, weights).map(drop),
             Self::SetEntryWeights { name, weights } => problem.set_entry_weights(name, weights).map(drop),
@@ -234,4 +245,12 @@ impl Call {
             | Self::Feedback { .. } => solver.run(problem, self),
         }
     }
+}
+
+/// Returns the placement with the given homogeneous matrix, row by row. Missing numbers are NaN, which are refused
+/// later.
+fn placement(m: &[f64]) -> Se3<f64> {
+    let at = |i: usize| m.get(i).copied().unwrap_or(f64::NAN);
+    let column = |j: usize| Vec3::new(at(j), at(4 + j), at(8 + j));
+    Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3))
 }

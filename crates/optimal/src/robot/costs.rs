@@ -48,6 +48,10 @@ impl Term for Cost {
         &self.residual
     }
 
+    fn residual_mut(&mut self) -> &mut Residual {
+        &mut self.residual
+    }
+
     fn weight(&self) -> f64 {
         self.weight
     }
@@ -135,6 +139,11 @@ impl Costs {
     /// Returns all cost terms.
     pub fn terms(&self) -> &[Cost] {
         self.terms.all()
+    }
+
+    /// Returns all terms with the plans of their residuals.
+    pub(super) fn all_mut(&mut self) -> &mut Terms<Cost> {
+        &mut self.terms
     }
 
     /// Changes the weight of the term called `name`, between solves. Returns whether such a term exists.

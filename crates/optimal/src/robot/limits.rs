@@ -11,6 +11,7 @@ use crate::Error;
 use crate::lq::LqKnot;
 use crate::problem::{Bounded, Multipliers, Part, Soft, Visit, leave_a_value};
 use condyle_dynamics::{Mat3, Model};
+use std::sync::Arc;
 
 /// Residual within bounds: lower ≤ r(x, u) ≤ upper. Equal bounds make an equality. If both lists of bounds are empty,
 /// the limit is r(x, u) = 0.
@@ -125,6 +126,10 @@ impl Limit {
                 return Err(format!("its {which} bound has {} numbers, expected {}", bounds.len(), plan.n));
             }
         }
+        let beyond = |lower: &f64| plan.range.is_finite() && *lower >= plan.range;
+        if let Some(i) = self.lower.iter().position(beyond) {
+            return Err(format!("entry {i} must be at least {}, but its range is {}", self.lower[i], plan.range));
+        }
         if let Some(Soft { linear, quadratic }) = self.soft.filter(|soft| !soft.is_valid()) {
             return Err(format!(
                 "its soft weights must be finite, at least 0, and not both 0; found {linear} and {quadratic}"
@@ -140,12 +145,16 @@ impl Term for Limit {
     fn residual(&self) -> &Residual {
         &self.residual
     }
+
+    fn residual_mut(&mut self) -> &mut Residual {
+        &mut self.residual
+    }
 }
 
 /// Limits of one knot.
 #[derive(Clone, Debug, Default)]
-struct LimitSet {
-    terms: Terms<Limit>,
+pub(super) struct LimitSet {
+    pub(super) terms: Terms<Limit>,
     /// Lower bounds of all limits, one after the other.
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -167,7 +176,11 @@ impl LimitSet {
             let plan = limit.plan(model, capabilities).map_err(wrong)?;
             let of_state = matches!(limit.residual, Residual::State { .. }) || limit.residual.is_kinematic();
             let (name, first, soft) = (limit.name.as_str().into(), set.lower.len(), limit.soft);
-            set.parts.push(Part { name, first, of_state, soft });
+            let rows = match &limit.residual {
+                Residual::Distances { pairs, .. } => pairs.iter().map(|pair| pair.to_string().into()).collect(),
+                _ => Arc::default(),
+            };
+            set.parts.push(Part { name, first, of_state, soft, rows });
             set.lower.extend(&limit.lower);
             set.upper.extend(&limit.upper);
             set.terms.push(limit, plan);
@@ -230,6 +243,11 @@ impl Limits {
             }
         }
         Ok(found)
+    }
+
+    /// Returns the limit sets of the knots of the chosen model.
+    pub(super) fn chosen_sets_mut(&mut self) -> &mut PerKnot<LimitSet> {
+        self.sets.chosen_mut()
     }
 
     /// Returns the limit sets of all knots and all models.

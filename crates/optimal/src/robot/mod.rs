@@ -65,6 +65,7 @@ mod knot_data;
 mod limits;
 mod motion;
 mod nudge;
+mod obstacles;
 mod outputs;
 mod own_constraint;
 mod problem;

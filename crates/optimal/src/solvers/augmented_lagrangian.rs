@@ -1,7 +1,7 @@
 //! Solver of constrained problems by an augmented Lagrangian method.
 
 use super::limit_rows;
-use super::outcome::{Outcome, Violation, ViolationKind};
+use super::outcome::{Outcome, Violation};
 use super::settings::{ConstraintSettings, Settings};
 use super::solution::{Iteration, Solution, Status};
 use super::solver_loop::{Pass, SolverLoop};
@@ -523,9 +523,7 @@ impl AugmentedLagrangian {
             bounded.multipliers.distance(t, i)
         });
         outcome.worst = match iterate.largest_gap() {
-            Some((knot, row, amount)) if amount > violation => {
-                Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })
-            }
+            Some((knot, row, amount)) if amount > violation => Some(Violation::of_gap(knot, row, amount)),
             _ => measured.worst,
         };
         let [open, closed] = [false, true].map(|fed_back| slopes(problem, knots, &iterate.solution, adjoint, fed_back));

@@ -2,7 +2,7 @@
 
 use super::outcome::{Outcome, Violation, ViolationKind};
 use crate::error::Error;
-use crate::problem::Problem;
+use crate::problem::{Part, Problem};
 use core::ops::Range;
 use std::sync::Arc;
 
@@ -117,9 +117,22 @@ impl Outcome {
 
 impl Violation {
     /// Returns the violation of the constraint `row` of a knot by `amount`, with the name of its limit.
-    pub(super) fn of_row(knot: usize, row: usize, named: Option<(Arc<str>, usize)>, amount: f64) -> Self {
-        let (name, entry) = named.map_or((None, row), |(name, entry)| (Some(name), entry));
-        Self { kind: ViolationKind::Constraint, knot, row, name, entry, amount }
+    pub(super) fn of_row(knot: usize, row: usize, part: Option<(&Part, usize)>, amount: f64) -> Self {
+        let mut found = Self { kind: ViolationKind::Constraint, knot, row, name: None, entry: row, what: None, amount };
+        if let Some((part, entry)) = part {
+            found.set_part(part, entry);
+        }
+        found
+    }
+
+    /// Sets the name of the row's limit, the index of the row in the limit, and the description of the row.
+    pub(super) fn set_part(&mut self, part: &Part, entry: usize) {
+        (self.name, self.entry, self.what) = (Some(part.name.clone()), entry, part.rows.get(entry).cloned());
+    }
+
+    /// Returns the violation of the dynamics by a gap of the given size in entry `row` of the tangent vector.
+    pub(super) fn of_gap(knot: usize, row: usize, amount: f64) -> Self {
+        Self { kind: ViolationKind::Gap, knot, row, name: None, entry: row, what: None, amount }
     }
 }
 

@@ -129,7 +129,7 @@ impl Problem {
                     }
                     let worst = if fixed { &mut all.fixed } else { &mut all.worst };
                     if worst.as_ref().is_none_or(|worst| worst.amount < amount) {
-                        let named = part().map(|part| (part.name.clone(), i - part.first));
+                        let named = part().map(|part| (part, i - part.first));
                         *worst = Some(Violation::of_row(t, before + i, named, amount));
                     }
                 }

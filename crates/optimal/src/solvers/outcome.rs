@@ -99,20 +99,27 @@ pub struct Violation {
     pub name: Option<Arc<str>>,
     /// Index of the row within the named limit; without a name, equal to `row`.
     pub entry: usize,
+    /// Description of the row: the two geometries of a limit of distances; `None` for other rows.
+    pub what: Option<Arc<str>>,
     /// Distance from the bound, or size of the gap, in the units of the row; infinite if it is NaN.
     pub amount: f64,
 }
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { kind, knot, row, name, entry, amount } = self;
-        match (kind, name) {
-            (ViolationKind::Gap, _) => write!(f, "knot {knot}: entry {row} of the gap is {amount:.3e}"),
-            (ViolationKind::ControlBound, _) => {
+        let Self { kind, knot, row, name, entry, what, amount } = self;
+        match (kind, name, what) {
+            (ViolationKind::Gap, ..) => write!(f, "knot {knot}: entry {row} of the gap is {amount:.3e}"),
+            (ViolationKind::ControlBound, ..) => {
                 write!(f, "knot {knot}: control {row} is {amount:.3e} beyond its bound")
             }
-            (_, Some(name)) => write!(f, "knot {knot}: entry {entry} of `{name}` is {amount:.3e} beyond its bound"),
-            (_, None) => write!(f, "knot {knot}: constraint {row} is {amount:.3e} beyond its bound"),
+            (_, Some(name), Some(pair)) => {
+                write!(f, "knot {knot}: distance of {pair} in `{name}` is {amount:.3e} beyond its bound")
+            }
+            (_, Some(name), None) => {
+                write!(f, "knot {knot}: entry {entry} of `{name}` is {amount:.3e} beyond its bound")
+            }
+            (_, None, _) => write!(f, "knot {knot}: constraint {row} is {amount:.3e} beyond its bound"),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Rows of soft limits that gave way, and their cost.
 
-use super::outcome::{Violation, ViolationKind};
+use super::outcome::Violation;
 use crate::problem::{Bounded, Problem};
 
 /// Distance from which a row counts as one that gave way, as a multiple of the tolerance. On the central path, a row
@@ -31,8 +31,7 @@ impl Problem {
                     cost += soft.cost(amount);
                     let amount = if amount.is_nan() { f64::INFINITY } else { amount };
                     if amount > NOTICEABLE * tolerance {
-                        let (kind, name) = (ViolationKind::Constraint, Some(part.name.clone()));
-                        out.push(Violation { kind, knot: t, row: before + i, name, entry: i - part.first, amount });
+                        out.push(Violation::of_row(t, before + i, Some((part, i - part.first)), amount));
                     }
                 }
                 before += bounded.count;

@@ -9,7 +9,7 @@ use condyle_optimal::robot::{
     ContactInverseDynamics, GenericResidual, Geometry, GeometryPair, Inputs, Knot, Limit, OwnResidual, RobotProblem,
     RobotState, Shape,
 };
-use condyle_optimal::{AugmentedLagrangian, LqKnot};
+use condyle_optimal::{AugmentedLagrangian, InteriorPoint, LqKnot};
 use condyle_spatial::Scalar;
 
 /// Number of pairs in most tests. A residual with this number of entries needs more than one slot of 8 entries.
@@ -82,12 +82,12 @@ fn both(model: &Arc<Model>, rng: &mut StdRng) -> [Vec<Cost>; 2] {
     let written = OwnResidual::autodiff(model.clone(), Written::new(model, &pairs));
     let (com, place, other) = (vector(0.5, rng), vector(0.5, rng), self::pairs(model, 2, rng));
     let barrier = Activation::Barrier { lower: vec![0.2; PAIRS], upper: vec![0.6; PAIRS] };
-    [Residual::Distances { pairs }, Residual::Own(written)].map(|distances| {
+    [Residual::distances(pairs), Residual::Own(written)].map(|distances| {
         vec![
             cost("com", Residual::CenterOfMass { target: com }, Activation::Quadratic),
             cost("distances", distances, barrier.clone()),
             cost("place", Residual::FrameTranslation { frame: frame.clone(), target: place }, Activation::Quadratic),
-            cost("others", Residual::Distances { pairs: other.clone() }, Activation::Smooth1 { epsilon: 0.2 }),
+            cost("others", Residual::distances(other.clone()), Activation::Smooth1 { epsilon: 0.2 }),
         ]
     })
 }
@@ -137,7 +137,7 @@ fn distances_are_those_of_a_written_residual() {
 
 /// Returns the gradient of the sum of the distances, with its value, at a state x of a terminal knot.
 fn sum_at(model: &Arc<Model>, pairs: Vec<GeometryPair>, x: &[f64]) -> (f64, Vec<f64>) {
-    let costs = vec![Cost::new("sum", 1.0, Residual::Distances { pairs }, Activation::Sum)];
+    let costs = vec![Cost::new("sum", 1.0, Residual::distances(pairs), Activation::Sum)];
     let mut action = FreeDynamics::terminal(model.clone(), costs).unwrap();
     let mut knot = LqKnot::zeros(action.ndx(), 0);
     let value = action.calc(0, x, &[], &mut vec![0.0; x.len()]);
@@ -223,7 +223,7 @@ fn knots_with_other_obstacles_are_single_knots() {
         for GeometryPair { first, second } in &mut pairs {
             (first.shape, second.shape) = (Shape::sphere(vector(0.3, &mut rng), 0.1), Shape::sphere([0.1; 3], 0.2));
         }
-        Residual::Distances { pairs }
+        Residual::distances(pairs)
     };
     let apart = |residual| vec![cost("apart", residual, Activation::Smooth1 { epsilon: 0.1 })];
     let limit = |residual, count: usize| vec![Limit::new("limit", residual, vec![0.3; count], vec![0.4; count])];
@@ -236,7 +236,7 @@ fn knots_with_other_obstacles_are_single_knots() {
     action.set_costs(3, apart(moved(4))).unwrap();
     action.set_limits(7, limit(moved(PAIRS), PAIRS)).unwrap();
     let mut rng = StdRng::seed_from_u64(56);
-    action.set_costs(9, apart(Residual::Distances { pairs: pairs(&model, PAIRS, &mut rng) })).unwrap();
+    action.set_costs(9, apart(Residual::distances(pairs(&model, PAIRS, &mut rng)))).unwrap();
     check_group(action, &model, &mut rng);
 }
 
@@ -255,7 +255,7 @@ fn around(apart: bool, lower: f64) -> (Problem, Vec<f64>, Vec<f64>, Vec3<f64>) {
             let obstacle = Geometry::in_world(Shape::sphere(tool, radius));
             GeometryPair::new(Geometry::on(frame, Shape::sphere(Vec3::zero(), 0.05)), obstacle)
         };
-        let clear = Residual::Distances { pairs: vec![ball("tool"), ball(&arm.frames()[5].name)] };
+        let clear = Residual::distances(vec![ball("tool"), ball(&arm.frames()[5].name)]);
         vec![Limit::new("clear", clear, vec![lower; 2], vec![f64::INFINITY; 2])]
     };
     let costs = vec![
@@ -308,33 +308,117 @@ fn an_arm_passes_a_ball_with_a_margin() {
     }
 }
 
+/// Checks that placements of all knots have the bits of knots that are described one by one. The obstacle moves in
+/// costs and in limits.
+#[test]
+fn an_obstacle_moves_in_all_knots() {
+    const HORIZON: usize = 10;
+    let (arm, x0) = (Arc::new(robots::arm7()), [vec![0.0, 0.9, 0.0, 1.2, 0.0, 0.4, 0.0], vec![0.0; 7]].concat());
+    let tool = forward_kinematics(&arm, &mut Data::new(&arm), &x0[..7]).frame(arm.frame("tool").unwrap()).translation;
+    let at = |t: usize| Se3::new(Mat3::identity(), tool + Vec3::new(0.0, 0.3 - 0.02 * t as f64, 0.0));
+    let ball = |t: usize| {
+        let ball = Geometry::in_world(Shape::sphere([0.0; 3], 0.1)).named("ball").at(at(t));
+        let floor = Geometry::in_world(Shape::HalfSpace { normal: Vec3::new(0.0, 0.0, 1.0), offset: -0.2 });
+        let part = || Geometry::on("tool", Shape::capsule([0.0; 3], [0.0, 0.0, -0.1], 0.05));
+        Residual::distances(vec![GeometryPair::new(part(), ball), GeometryPair::new(floor, part())])
+    };
+    let costs = |t: usize| {
+        let barrier = Activation::Barrier { lower: vec![0.1; 2], upper: vec![f64::INFINITY; 2] };
+        let state = Residual::State { reference: x0.clone() };
+        let effort = Residual::Control { reference: vec![0.0; 7] };
+        let quadratic = |name, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+        vec![Cost::new("apart", 10.0, ball(t), barrier), quadratic("rest", 1.0, state), quadratic("tau", 1e-3, effort)]
+    };
+    let limits = |t: usize| vec![Limit::new("clear", ball(t), vec![0.02; 2], vec![f64::INFINITY; 2])];
+    let problem = |each: bool| {
+        let last = if each { HORIZON } else { 0 };
+        let knot = FreeDynamics::running(arm.clone(), 0.05, costs(0)).unwrap().with_limits(limits(0));
+        let mut knot = knot.unwrap();
+        for t in 0..if each { HORIZON } else { 0 } {
+            knot.set_costs(t, costs(t)).unwrap();
+            knot.set_limits(t, limits(t)).unwrap();
+        }
+        let end = FreeDynamics::terminal(arm.clone(), costs(last)[..2].to_vec()).unwrap().with_limits(limits(last));
+        let us = knot.quasi_static(&x0).repeat(HORIZON);
+        let models: Vec<Box<dyn ActionModel>> = vec![Box::new(knot)];
+        (Problem::new(x0.clone(), models, vec![0; HORIZON], Box::new(end.unwrap())).unwrap(), us)
+    };
+    let plan = |problem: &mut Problem, us: &[f64]| {
+        let mut solver = InteriorPoint::new(problem);
+        solver.solve(problem, &x0.repeat(HORIZON + 1), us).unwrap();
+        solver.solution().xs.clone()
+    };
+    let ((mut each, us), (mut moved, _)) = (problem(true), problem(false));
+    let (one_by_one, at_rest) = (plan(&mut each, &us), plan(&mut moved, &us));
+    assert!(moved.set_placements("ball", &(0..=HORIZON).map(at).collect::<Vec<_>>()).unwrap());
+    assert!(plan(&mut moved, &us) == one_by_one && one_by_one != at_rest);
+    assert!(!moved.set_placements("bal", &[at(0); HORIZON + 1]).unwrap());
+    let text = moved.set_placements("ball", &[at(0); 3]).unwrap_err().to_string();
+    assert_eq!(text, "`placements`: expected length 11, found 3");
+    let mut placements = [at(0); HORIZON + 1];
+    placements[4].translation.x = f64::NAN;
+    let text = moved.set_placements("ball", &placements).unwrap_err().to_string();
+    assert_eq!(text, "geometry `ball`, knot 4: its placement is not a rotation with a finite translation");
+    assert!(plan(&mut moved, &us) == one_by_one); // nothing changed
+}
+
+/// Checks that the message about a limit of distances names the shapes.
+#[test]
+fn a_violated_distance_is_named() {
+    let arm = Arc::new(robots::arm7());
+    let part = Geometry::on("tool", Shape::sphere([0.0; 3], 0.05)).named("hand");
+    let floor = Geometry::in_world(Shape::HalfSpace { normal: Vec3::new(0.0, 0.0, 1.0), offset: 5.0 });
+    let pairs = vec![GeometryPair::new(part, floor)];
+    for (range, text) in [
+        (0.1, "limit `clear`: entry 0 must be at least 0.2, but its range is 0.1"),
+        (0.0, "limit `clear`: its range is 0, expected a number above 0"),
+    ] {
+        let clear = Residual::Distances { pairs: pairs.clone(), range };
+        let limit = Limit::new("clear", clear, vec![0.2], vec![f64::INFINITY]);
+        let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap();
+        assert_eq!(end.with_limits(vec![limit]).map(|_| ()).unwrap_err().to_string(), text);
+    }
+    let limit = Limit::new("clear", Residual::distances(pairs), vec![0.0], vec![f64::INFINITY]);
+    let effort = Cost::new("tau", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);
+    let knot = FreeDynamics::running(arm.clone(), DT, vec![effort]).unwrap().with_limits(vec![limit]).unwrap();
+    let end = FreeDynamics::terminal(arm, vec![]).unwrap();
+    let mut problem = Problem::new(vec![0.0; 14], vec![Box::new(knot)], vec![0; 3], Box::new(end)).unwrap();
+    let mut solver = InteriorPoint::new(&problem);
+    solver.solve(&mut problem, &[0.0; 56], &[0.0; 21]).unwrap();
+    let worst = solver.outcome().worst.clone().unwrap();
+    assert_eq!(worst.what.as_deref(), Some("`hand` and half-space in the world"));
+    let text = "distance of `hand` and half-space in the world in `clear` is ";
+    assert!(worst.to_string().contains(text), "{worst}");
+}
+
 #[test]
 fn a_wrong_geometry_is_refused_by_its_field() {
     let arm = Arc::new(robots::arm7());
     let good = || Geometry::on("tool", Shape::sphere([0.0, 0.0, 0.1], 0.05));
     let said = |first: Geometry, second: Geometry| {
         let pairs = vec![GeometryPair::new(good(), good()), GeometryPair::new(first, second)];
-        let costs = vec![cost("apart", Residual::Distances { pairs: pairs.clone() }, Activation::Quadratic)];
+        let costs = vec![cost("apart", Residual::distances(pairs.clone()), Activation::Quadratic)];
         let error = FreeDynamics::terminal(arm.clone(), costs).map(|_| ()).unwrap_err().to_string();
-        let limit = Limit::new("apart", Residual::Distances { pairs }, vec![0.0; 2], vec![1.0; 2]);
+        let limit = Limit::new("apart", Residual::distances(pairs), vec![0.0; 2], vec![1.0; 2]);
         let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap();
         let same = end.with_limits(vec![limit]).map(|_| ()).unwrap_err().to_string();
         assert_eq!(same.replace("limit", "cost"), error);
         error
     };
     let world = |center: [f64; 3], radius| Geometry::in_world(Shape::sphere(center, radius));
-    let text = "cost `apart`: its pairs[1].first: radius is -0.1, expected at least 0";
+    let text = "cost `apart`: its pairs[1].first (sphere on `tool`): radius is -0.1, expected at least 0";
     assert_eq!(said(Geometry::on("tool", Shape::sphere([0.0; 3], -0.1)), good()), text);
-    let text = "cost `apart`: its pairs[1].second: radius holds a NaN";
+    let text = "cost `apart`: its pairs[1].second (sphere in the world): radius holds a NaN";
     assert_eq!(said(good(), world([0.0; 3], f64::NAN)), text);
-    let text = "cost `apart`: its pairs[1].second: center holds an infinite number";
+    let text = "cost `apart`: its pairs[1].second (sphere in the world): center holds an infinite number";
     assert_eq!(said(good(), world([0.0, f64::INFINITY, 0.0], 0.1)), text);
-    let text = "cost `apart`: its pairs[1]: has no frame: expected at least one geometry on the robot";
-    assert_eq!(said(world([0.0; 3], 0.1), world([1.0; 3], 0.1)), text);
+    let text = said(world([0.0; 3], 0.1), world([1.0; 3], 0.1));
+    assert!(text.starts_with("cost `apart`: its pairs[1] (sphere in the world and sphere in the world): "), "{text}");
+    assert!(text.ends_with("has no frame: expected at least one geometry on the robot"), "{text}");
     let unknown = said(good(), Geometry::on("tol", Shape::sphere([0.0; 3], 0.1)));
-    assert!(unknown.starts_with("cost `apart`: its pairs[1].second: frame: "), "{unknown}");
+    assert!(unknown.starts_with("cost `apart`: its pairs[1].second (sphere on `tol`): frame: "), "{unknown}");
     assert!(unknown.contains("`tol`") && unknown.contains("`tool`"), "{unknown}");
-    let residual = Residual::Distances { pairs: vec![GeometryPair::new(good(), world([1.0; 3], 0.1))] };
+    let residual = Residual::distances(vec![GeometryPair::new(good(), world([1.0; 3], 0.1))]);
     let short = Limit::new("short", residual, vec![0.0; 2], vec![1.0; 1]);
     let end = FreeDynamics::terminal(arm, vec![]).unwrap();
     let error = end.with_limits(vec![short]).map(|_| ()).unwrap_err().to_string();
@@ -344,7 +428,7 @@ fn a_wrong_geometry_is_refused_by_its_field() {
 #[test]
 fn distances_in_a_file_are_the_same() {
     let (mut rng, model) = (StdRng::seed_from_u64(57), robots::humanoid());
-    let residual = Residual::Distances { pairs: pairs(&model, PAIRS, &mut rng) };
+    let residual = Residual::distances(pairs(&model, PAIRS, &mut rng));
     let costs = vec![cost("apart", residual.clone(), Activation::Quadratic)];
     let mut terminal = Knot::new(condyle_optimal::robot::Dynamics::Terminal, costs);
     terminal.limits.push(Limit::new("apart", residual, vec![0.0; PAIRS], vec![f64::INFINITY; PAIRS]));
@@ -357,7 +441,7 @@ fn distances_in_a_file_are_the_same() {
         "second":{"shape":{"sphere":{"center":{"x":0.4,"y":0.0,"z":0.5},"radius":0.2}}}}]}}"#;
     let tool = Geometry::on("tool", Shape::sphere([0.0, 0.0, 0.1], 0.05));
     let pair = GeometryPair::new(tool, Geometry::in_world(Shape::sphere([0.4, 0.0, 0.5], 0.2)));
-    let residual = Residual::Distances { pairs: vec![pair] };
+    let residual = Residual::distances(vec![pair]);
     assert_eq!(serde_json::from_str::<Residual>(text).unwrap(), residual);
     let compact: String = text.split_whitespace().collect();
     assert_eq!(serde_json::to_string(&residual).unwrap(), compact);

@@ -53,16 +53,26 @@ fn residuals_are_distances_of_the_library() {
         let (mut data, mut distances) = (Data::new(&model), Distances::new(&prepared));
         let x = random_state(&model, &mut rng);
         prepared.gradients(forward_kinematics(&model, &mut data, &x[..model.nq()]), &mut distances);
+        let (mut far, mut near) = (0, 0);
         for (k, pair) in list.into_iter().enumerate() {
-            let costs = vec![Cost::new("one", 1.0, Residual::Distances { pairs: vec![pair] }, Activation::Sum)];
-            let mut action = FreeDynamics::terminal(model.clone(), costs).unwrap();
-            let mut knot = LqKnot::zeros(action.ndx(), 0);
-            let value = action.calc(0, &x, &[], &mut vec![0.0; x.len()]);
-            action.calc_diff(0, &x, &[], &mut knot);
-            assert!((value - distances.distance(k)).abs() < ROUNDING, "{k}: {value} {}", distances.distance(k));
-            let row = &knot.q.as_slice()[..model.nv()];
-            assert!(largest_difference(row, distances.gradient(k)) < ROUNDING, "{k}: {row:?}");
+            let d = distances.distance(k);
+            // with a range r, an entry is min(d, r), without derivatives above r
+            for range in [f64::INFINITY, 0.3, 0.05] {
+                let residual = Residual::Distances { pairs: vec![pair.clone()], range };
+                let costs = vec![Cost::new("one", 1.0, residual, Activation::Sum)];
+                let mut action = FreeDynamics::terminal(model.clone(), costs).unwrap();
+                let mut knot = LqKnot::zeros(action.ndx(), 0);
+                let value = action.calc(0, &x, &[], &mut vec![0.0; x.len()]);
+                action.calc_diff(0, &x, &[], &mut knot);
+                assert!((value - d.min(range)).abs() < ROUNDING, "{k}: {value} {d} {range}");
+                let row = &knot.q.as_slice()[..model.nv()];
+                let zeros = vec![0.0; model.nv()];
+                let expected = if d < range { distances.gradient(k) } else { &zeros };
+                assert!(largest_difference(row, expected) < ROUNDING, "{k}: {row:?}");
+            }
+            (far, near) = (far + usize::from(d > 0.3), near + usize::from(d < 0.3));
         }
+        assert!(far > 3 && near > 3, "{far} far and {near} near pairs");
     }
 }
 
@@ -72,8 +82,7 @@ fn knots_with_other_shapes_are_single_knots() {
     let mut rng = StdRng::seed_from_u64(72);
     let model = Arc::new(robots::quadruped().with_limbs(false)); // parallel branches change the order of sums
     let common = pairs(&model, &mut rng);
-    let apart =
-        |pairs| vec![Cost::new("apart", 0.7, Residual::Distances { pairs }, Activation::Smooth1 { epsilon: 0.1 })];
+    let apart = |pairs| vec![Cost::new("apart", 0.7, Residual::distances(pairs), Activation::Smooth1 { epsilon: 0.1 })];
     let mut action = FreeDynamics::running(model.clone(), DT, apart(common.clone())).unwrap();
     for knot in [1, 2, 5, 6] {
         let mut moved = common.clone();
@@ -102,7 +111,7 @@ fn around(list: Vec<GeometryPair>, postures: [[f64; 7]; 2]) -> [Vec<f64>; 2] {
         let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap();
         let us = knot.quasi_static(&x0).repeat(horizon);
         if limited {
-            let clear = Residual::Distances { pairs: list.clone() };
+            let clear = Residual::distances(list.clone());
             let n = list.len();
             let limit = Limit::new("clear", clear, vec![MARGIN; n], vec![f64::INFINITY; n]);
             knot = knot.with_limits(vec![limit]).unwrap();

@@ -59,7 +59,7 @@ fn read<'a>(mut reader: Reader<'a>, root: &'a Element) -> Result<Collisions, Err
     }
     for exclude in root.all("contact").flat_map(|contact| contact.all("exclude")) {
         let body = |name: &str| exclude.attribute(name).ok_or_else(|| exclude.lacks(name));
-        all.disable(body("body1")?, body("body2")?);
+        all.leave_apart(body("body1")?, body("body2")?);
     }
     Ok(all)
 }

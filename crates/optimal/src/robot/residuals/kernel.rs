@@ -6,12 +6,14 @@ use super::layout::{Plan, ROWS, STRIDE, row_width};
 use super::residual::Residual;
 use super::terms::KnotTerms;
 use crate::robot::knot_data::{KnotData, WIDEST, unpack, unpack_matrix};
-use condyle_dynamics::distances::prepared::{Method, NUMBERS, PreparedPair, round_distance};
+use condyle_dynamics::distances::prepared::{
+    NUMBERS, Near, PreparedPairs, RESULT, find_near, other_results, pair_distances, pair_rows, place_shapes,
+};
 use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities,
 };
-use condyle_spatial::block::{Block, Strided, gather_rows, scatter_rows};
+use condyle_spatial::block::{Block, Strided, gather_rows};
 use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
 /// Group of knots whose residuals read the same quantities.
@@ -73,8 +75,36 @@ pub(crate) struct ResidualKernel<S> {
     Jcom: Matrix<S>,
     /// Vector of zeros. Shape: nv.
     zero: Vec<S>,
-    /// Row of the Jacobian of a distance. Shape: nv.
-    row: Vec<S>,
+    distances: DistanceBuffers<S>,
+}
+
+/// Workspace of distances. Grows to the largest number of pairs.
+#[derive(Debug)]
+struct DistanceBuffers<S> {
+    /// Numbers of all shapes, first in their bodies, then in the world. Shape: shapes × [`NUMBERS`].
+    shapes: Vec<S>,
+    /// Distance, witness point and normal of each pair. Shape: pairs × [`RESULT`].
+    results: Vec<S>,
+    /// Pairs within the range in some lane.
+    near: Near,
+    /// Distances. Shape: pairs.
+    r: Vec<S>,
+    /// Rows of the Jacobian. Shape: pairs × nv.
+    rows: Vec<S>,
+}
+
+impl<S: Scalar> DistanceBuffers<S> {
+    /// Makes the workspace large enough for pairs. Allocates only if there were never as many pairs or shapes.
+    fn reserve(&mut self, pairs: &PreparedPairs, nv: usize) {
+        let (n, shapes) = (pairs.len(), pairs.shape_count());
+        let sizes = [shapes * NUMBERS, n * RESULT, n, n * nv];
+        for (numbers, size) in [&mut self.shapes, &mut self.results, &mut self.r, &mut self.rows].into_iter().zip(sizes)
+        {
+            if numbers.len() < size {
+                numbers.resize(size, S::zero());
+            }
+        }
+    }
 }
 
 impl<S: Block<Number = f64>> ResidualKernel<S> {
@@ -87,13 +117,19 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
             J: [wide(6), wide(6)],
             Jcom: wide(3),
             zero: vec![S::zero(); nv],
-            row: vec![S::zero(); nv],
+            distances: DistanceBuffers {
+                shapes: vec![],
+                results: vec![],
+                near: Near::default(),
+                r: vec![],
+                rows: vec![],
+            },
         }
     }
 
     /// Computes the kinematic residuals of the knots of `group` at (q, v), and the rows of their Jacobians.
     pub(crate) fn run(&mut self, model: &Model, data: &mut Data<S>, [q, v]: [&[S]; 2], group: &mut KnotGroup<'_>) {
-        let Self { t, r, J, Jcom, zero, row } = self;
+        let Self { t, r, J, Jcom, zero, distances } = self;
         let requirements = group.terms[0].layout().requirements;
         if group.slopes && requirements.com {
             center_of_mass_jacobian(model, data, q, Jcom);
@@ -123,7 +159,7 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
         };
         group.each(|group, [list, i], residual, plan| {
             if let Residual::Distances { .. } = residual {
-                return write_distances(placements, group, [list, i], plan, (r, row));
+                return write_distances(model, placements, group, [list, i], plan, distances);
             }
             if S::LANES == 1 {
                 gather_rows(&[&residual.target_numbers()], t);
@@ -160,56 +196,43 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
 /// Computes the distances of residual i of a list, and the rows of their Jacobian. All knots of the group have the
 /// pairs of bodies and the methods of `plan`, but the geometries may differ.
 fn write_distances<S: Block<Number = f64>>(
+    model: &Model,
     placements: Placements<'_, S>,
     group: &mut KnotGroup<'_>,
     [list, i]: [usize; 2],
     plan: &Plan,
-    (r, row): (&mut [S; STRIDE], &mut [S]),
+    buffers: &mut DistanceBuffers<S>,
 ) {
-    let nv = row.len();
-    for (k, pair) in plan.pairs.iter().enumerate() {
-        let of = |knot: usize| {
-            let terms = group.terms.get(knot).unwrap_or(&group.terms[0]);
-            terms.0[list].kinematic(i).map_or(pair, |(.., plan)| &plan.pairs[k])
-        };
-        let (bodies, count) = (pair.bodies(), group.terms.len());
-        if pair.method() == Method::Other {
-            witnesses(placements, bodies, &of, count, r);
-        } else {
-            let (numbers, mut t) =
-                (core::array::from_fn::<_, WIDEST, _>(|knot| of(knot).numbers()), [S::zero(); NUMBERS]);
-            gather_rows(&numbers.each_ref().map(<[f64; NUMBERS]>::as_slice)[..count], &mut t);
-            round_distances(placements, bodies, pair.method(), &t, r);
-        }
-        let at = plan.slot * STRIDE + k;
-        unpack(&r[..1], group.data, |data| &mut data.residuals.kinematic[list].r[at..]);
-        if group.slopes {
-            distance_row(placements, bodies, r, row);
-            let at = plan.slot * ROWS * nv + k * nv;
-            unpack(row, group.data, |data| &mut data.residuals.kinematic[list].rows[at..]);
-        }
+    let (all, pairs, nv, count) = (group.terms, &plan.pairs, model.nv(), group.terms.len());
+    let of = |knot: usize| {
+        let terms = all.get(knot).unwrap_or(&all[0]);
+        terms.0[list].kinematic(i).map_or(pairs, |(.., plan)| &plan.pairs)
+    };
+    buffers.reserve(pairs, nv);
+    let DistanceBuffers { shapes, results, near, r, rows } = buffers;
+    near.reset(plan.range, pairs.len());
+    let shapes = &mut shapes[..pairs.shape_count() * NUMBERS];
+    let results = &mut results[..pairs.len() * RESULT];
+    let is_common = (0..count).all(|knot| core::ptr::eq(of(knot), pairs));
+    for (k, shape) in shapes.chunks_exact_mut(NUMBERS).enumerate().take(if is_common { 0 } else { usize::MAX }) {
+        let numbers = core::array::from_fn::<_, WIDEST, _>(|knot| of(knot).numbers(k));
+        gather_rows(&numbers.each_ref().map(<[f64; NUMBERS]>::as_slice)[..count], shape);
     }
-}
-
-/// Computes the distance of a pair for one knot after another. Writes distance, witness point and normal to `r`.
-fn witnesses<'a, S: Block<Number = f64>>(
-    placements: Placements<'_, S>,
-    bodies: [usize; 2],
-    of: &dyn Fn(usize) -> &'a PreparedPair,
-    count: usize,
-    r: &mut [S; STRIDE],
-) {
-    let (mut lanes, mut poses) = ([S::zero(); 24], [[0.0; 24]; WIDEST]);
-    body_poses(placements, bodies, &mut lanes);
-    scatter_rows(&lanes, &mut poses.each_mut().map(<[f64; 24]>::as_mut_slice)[..count]);
-    let mut found = [[0.0; 7]; WIDEST];
-    for (knot, found) in found[..count].iter_mut().enumerate() {
-        let vector = |k: usize| Vec3::new(poses[knot][k], poses[knot][k + 1], poses[knot][k + 2]);
-        let pose = |k| Se3::new(Mat3 { x: vector(k), y: vector(k + 3), z: vector(k + 6) }, vector(k + 9));
-        let (distance, p, n) = of(knot).distance(&[pose(0), pose(12)]);
-        *found = [distance, p.x, p.y, p.z, n.x, n.y, n.z];
+    place_shapes(placements, pairs, is_common, shapes);
+    find_near(pairs, shapes, near);
+    pair_distances(pairs, shapes, near, results);
+    other_results(placements, &of, count, near, results);
+    for (r, result) in r.iter_mut().zip(results.chunks_exact(RESULT)) {
+        *r = result[0];
     }
-    gather_rows(&found.each_ref().map(<[f64; 7]>::as_slice)[..count], &mut r[..7]);
+    let at = plan.slot * STRIDE;
+    unpack(&r[..pairs.len()], group.data, |data| &mut data.residuals.kinematic[list].r[at..]);
+    if group.slopes {
+        let rows = &mut rows[..pairs.len() * nv];
+        pair_rows(placements, pairs, near, results, rows);
+        let at = plan.slot * ROWS * nv;
+        unpack(rows, group.data, |data| &mut data.residuals.kinematic[list].rows[at..]);
+    }
 }
 
 kernel! {
@@ -378,44 +401,6 @@ kernel! {
                 column[..3].copy_from_slice(&turned.to_array());
             }
         }
-    }
-}
-
-kernel! {
-    /// Writes the columns of the rotation and the translation of two bodies.
-    fn body_poses<S>(placements: Placements<'_, S>, bodies: [usize; 2], poses: &mut [S; 24]) {
-        for k in 0..2 {
-            let Se3 { rotation: Mat3 { x, y, z }, translation } = placements.body(bodies[k]);
-            let columns = [x, y, z, translation];
-            for i in 0..4 {
-                poses[12 * k + 3 * i..][..3].copy_from_slice(&columns[i].to_array());
-            }
-        }
-    }
-}
-
-kernel! {
-    /// Computes the signed distance of two spheres or capsules on bodies, a witness point and the normal. `t` contains
-    /// the numbers of both shapes.
-    fn round_distances<S>(
-        placements: Placements<'_, S>, bodies: [usize; 2], method: Method, t: &[S; NUMBERS], r: &mut [S; STRIDE],
-    ) {
-        let poses = [placements.body(bodies[0]), placements.body(bodies[1])];
-        let (distance, p, n) = round_distance(method, t, poses);
-        r[..7].copy_from_slice(&[distance, p.x, p.y, p.z, n.x, n.y, n.z]);
-    }
-}
-
-kernel! {
-    /// Computes the row nᵀ (J₁ − J₂) of a distance's Jacobian. `r` contains the distance, a witness point and n.
-    fn distance_row<S>(
-        placements: Placements<'_, S>, bodies: [usize; 2], r: &[S; STRIDE], row: &mut [S],
-    ) {
-        row.fill(S::zero());
-        // the line of the force n contains both witness points, so one moment about the origin serves for both bodies
-        let f = Force::at_point(Vec3::new(r[1], r[2], r[3]), Vec3::new(r[4], r[5], r[6]));
-        placements.add_body_efforts(bodies[0], f, row); // J₁ᵀ n
-        placements.add_body_efforts(bodies[1], -f, row);
     }
 }
 

@@ -7,7 +7,7 @@ use super::residual::{Part, Residual};
 use crate::lq::LARGEST_BLOCK;
 use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::Model;
-use condyle_dynamics::distances::prepared::PreparedPair;
+use condyle_dynamics::distances::prepared::PreparedPairs;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;
 
@@ -24,7 +24,9 @@ pub(crate) struct Plan {
     /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
     /// Pairs of geometries whose distances are the entries of the residual; empty for other residuals.
-    pub pairs: Vec<PreparedPair>,
+    pub pairs: PreparedPairs,
+    /// Range of these distances (m).
+    pub range: f64,
     /// Range in λ of the rows of the residual's contact.
     pub rows: Range<usize>,
     /// Whether the knot has contacts.
@@ -45,11 +47,12 @@ impl Plan {
             _ => residual.force_rows(rows.len()),
         };
         let pairs = match residual {
-            Residual::Distances { pairs } => prepare(model, pairs)?,
-            _ => Vec::new(),
+            Residual::Distances { pairs, .. } => prepare(model, pairs)?,
+            _ => PreparedPairs::default(),
         };
+        let range = if let Residual::Distances { range, .. } = residual { *range } else { f64::INFINITY };
         let in_contact = !capabilities.contacts.is_empty();
-        Ok(Self { n, first: 0, slot: 0, frame, pairs, rows, in_contact, W })
+        Ok(Self { n, first: 0, slot: 0, frame, pairs, range, rows, in_contact, W })
     }
 
     /// Returns the number of slots that a kinematic residual occupies. Slots are consecutive, so a residual with many
@@ -58,13 +61,10 @@ impl Plan {
         self.n.div_ceil(STRIDE)
     }
 
-    /// Returns whether two kinematic residuals of the same kind read the same frame and the same pairs of bodies, whose
-    /// distances are computed by the same methods.
+    /// Returns whether two kinematic residuals of the same kind read the same frame, and the same pairs of shapes up to
+    /// sizes and poses.
     pub(crate) fn reads_the_bodies_of(&self, other: &Self) -> bool {
-        let pair = |plan: &Self, k: usize| (plan.pairs[k].bodies(), plan.pairs[k].method());
-        self.frame == other.frame
-            && self.pairs.len() == other.pairs.len()
-            && (0..self.pairs.len()).all(|k| pair(self, k) == pair(other, k))
+        self.frame == other.frame && self.range == other.range && self.pairs.is_like(&other.pairs)
     }
 }
 

@@ -133,7 +133,7 @@ pub enum Residual {
     /// let goal = [vec![0.6], x0[1..].to_vec()].concat();
     /// let ball = Shape::sphere(place(&[vec![0.0], x0[1..7].to_vec()].concat()), 0.1);
     /// let pair = GeometryPair::new(Geometry::on("tool", Shape::sphere(Vec3::zero(), 0.05)), Geometry::in_world(ball));
-    /// let clear = Residual::Distances { pairs: vec![pair] };
+    /// let clear = Residual::distances(vec![pair]);
     /// let cost = |name, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
     /// let costs = vec![
     ///     cost("rest", 1e-1, Residual::State { reference: goal.clone() }),
@@ -156,6 +156,12 @@ pub enum Residual {
     Distances {
         /// Pairs of geometries, one for each entry.
         pairs: Vec<GeometryPair>,
+        /// Range r (m), above 0: an entry is min(d, r). Pairs that are farther away cost only a comparison of bounding
+        /// spheres, and have no derivatives. Infinite for the distances of all pairs. A limit needs a range well above
+        /// its bounds.
+        #[cfg_attr(feature = "serde", serde(default = "everywhere", with = "condyle_spatial::finite::greatest"))]
+        #[cfg_attr(feature = "serde", serde(skip_serializing_if = "is_everywhere"))]
+        range: f64,
     },
     /// Error λ − λ_ref of a contact's force or impulse along the axes of the contact's rows: 1, 2, 3 or 6 entries,
     /// linear first.
@@ -221,7 +227,25 @@ pub(crate) enum Part {
     All,
 }
 
+/// Returns the range of distances without a limit.
+#[cfg(feature = "serde")]
+fn everywhere() -> f64 {
+    f64::INFINITY
+}
+
+/// Returns whether a range has no limit.
+#[cfg(feature = "serde")]
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
+fn is_everywhere(range: &f64) -> bool {
+    *range == f64::INFINITY
+}
+
 impl Residual {
+    /// Returns the distances of all pairs, without a range.
+    pub fn distances(pairs: Vec<GeometryPair>) -> Self {
+        Self::Distances { pairs, range: f64::INFINITY }
+    }
+
     /// Returns which block of the Hessian has nonzero entries.
     pub(crate) fn part(&self) -> Part {
         match self {
@@ -362,7 +386,10 @@ impl Residual {
                 return Err("only an impact changes velocities at once".to_owned());
             }
             Self::ImpulseCenterOfMass => 3,
-            Self::Distances { pairs } => prepare(model, pairs)?.len(),
+            Self::Distances { range, .. } if range.is_nan() || *range <= 0.0 => {
+                return Err(format!("its range is {range}, expected a number above 0"));
+            }
+            Self::Distances { pairs, .. } => prepare(model, pairs)?.len(),
             Self::Own(own) => own.check(model, nu).map(|()| own.size())?,
         };
         match self.output() {

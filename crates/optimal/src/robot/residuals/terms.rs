@@ -10,6 +10,9 @@ use crate::robot::knot_data::Sensitivities;
 pub(crate) trait Term {
     fn residual(&self) -> &Residual;
 
+    /// Returns the residual, to change its numbers in place.
+    fn residual_mut(&mut self) -> &mut Residual;
+
     /// Returns the weight. A term with the weight 0 is not computed.
     fn weight(&self) -> f64 {
         1.0

@@ -128,13 +128,14 @@ impl ResidualView<'_> {
         if let Residual::Own(own) = residual {
             return self.push_own_rows(own, plan.n, sensitivities);
         }
+        let active = |worth: &[f64; 2]| *worth != [0.0, 0.0]; // false for an entry inside its bounds
         if residual.part() == Part::Positions {
-            for (row, worth) in self.kinematics.rows(nv, residual, plan).zip(worth) {
+            let rows = self.kinematics.rows(nv, residual, plan).zip(worth);
+            for (row, worth) in rows.filter(|(_, worth)| active(worth)) {
                 s.rows.push_positions(row, worth);
             }
             return;
         }
-        let active = |worth: &[f64; 2]| *worth != [0.0, 0.0]; // false for a row of a cone inside its bounds
         if residual.is_kinematic() {
             let rows = self.kinematics.rows(nv, residual, plan).zip(worth);
             for (row, worth) in rows.filter(|(_, worth)| active(worth)) {
@@ -278,6 +279,10 @@ impl ResidualView<'_> {
                 }
                 let numbers = (0..plan.n).map(|i| [s.r[i], lower[i], upper[i]]);
                 knot.rows.push_group(&plan.W, numbers);
+            }
+            _ if residual.part() == Part::Positions && residual.is_kinematic() => {
+                let rows = self.kinematics.rows(self.model.nv(), residual, plan);
+                rows.enumerate().for_each(|(i, row)| push(0, row, i, s.r[i]));
             }
             _ => {
                 s.clear();

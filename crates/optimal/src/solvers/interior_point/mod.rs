@@ -11,7 +11,7 @@ mod slacks;
 mod step;
 mod tick;
 
-use super::outcome::{Outcome, Violation, ViolationKind};
+use super::outcome::{Outcome, Violation};
 use super::settings::Settings;
 use super::solution::{Fallback, Iteration, Solution, Status};
 use super::solver_loop::SolverLoop;
@@ -509,9 +509,7 @@ impl InteriorPoint {
         solution.feasible = solution.gap <= tolerance;
         solution.status = status;
         self.outcome.worst = match largest_gap {
-            Some((knot, row, amount)) if amount > rows.violation => {
-                Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })
-            }
+            Some((knot, row, amount)) if amount > rows.violation => Some(Violation::of_gap(knot, row, amount)),
             _ => self.slacks.worst(problem, true),
         };
         let fixed = self.slacks.worst(problem, false).filter(|violation| violation.amount > tolerance);

@@ -443,7 +443,7 @@ impl Slacks {
                     let kind =
                         if row < self.counts[t] { ViolationKind::Constraint } else { ViolationKind::ControlBound };
                     let row = if row < self.counts[t] { row } else { row - self.counts[t] };
-                    worst = Some(Violation { kind, knot: t, row, name: None, entry: row, amount });
+                    worst = Some(Violation { kind, ..Violation::of_row(t, row, None, amount) });
                 }
             }
         }
@@ -456,7 +456,7 @@ impl Slacks {
                 && own < bounded.count
                 && let Some(part) = part
             {
-                (violation.name, violation.entry) = (Some(part.name.clone()), own - part.first);
+                violation.set_part(part, own - part.first);
             }
             first += bounded.count;
         });
