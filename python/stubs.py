@@ -98,6 +98,10 @@ ARGUMENTS = {
     "ArrayLike | None": """
         _DifferentialIk._step.v0 _DifferentialIk._place.velocity Model.append.placement
         ModelBuilder.append.placement ModelBuilder.merge.placement""",
+    "Fddp": "_solve_many.solver",
+    "tuple[Any, Any]": "_solve_many.start",
+    "tuple[Callable[..., object], list[Any]] | None": "_solve_many.vary",
+    "Callable[[int], object] | None": "_solve_many.report",
     "Model": "model",
     "Data": "data",
     "_SpelledModel": " ".join(f"{name}.model" for name in ("_SpelledData", *SPELLED)),
@@ -234,6 +238,7 @@ ARGUMENTS = {
     "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
         ConstrainedAction.calc_diff Residual.own.calc_diff""",
     "dict[str, Any]": """
+        _solve_many.data
         AugmentedLagrangian.inner AugmentedLagrangian._make.settings Fddp._make.settings
         InteriorPoint._make.settings""",
     "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner InteriorPoint._make.inner",
@@ -254,7 +259,7 @@ ARGUMENTS = {
         _DifferentialIk.limits _GlobalIk.limits
         _borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model
         Model.from_mujoco.model""",
-    "list[str]": "names _generate.frames inputs _GlobalIk.frames",
+    "list[str]": "names _generate.frames inputs _GlobalIk.frames _solve_many.keep",
     "list[ContactConstraint]": "_generate.constraints",
 }
 
@@ -334,6 +339,7 @@ RESULTS = {
     "Command": "WholeBodyController.command WholeBodyController.step",
     "KktResiduals": "WholeBodyController.kkt_residuals",
     "None": """
+        ArmMpc.place Problem.set_placements WholeBodyController.place
         _Collisions._disable _Collisions._srdf _DistancePairs._place
         ArmMpc.reset JointPolicy.release JointPolicy.stop WholeBodyMpc.command WholeBodyMpc.prepare WholeBodyMpc.reset
         WholeBodyMpc.set_gait WholeBodyMpc.terrain WholeBodyMpc.touch
@@ -401,6 +407,7 @@ RESULTS = {
     "RecordedTick": "Record.__getitem__",
     "Difference | None": "Record.replay",
     "tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]": "Record.start",
+    "tuple[dict[str, Any], list[tuple[int, BaseException]]]": "_solve_many",
     "Evaluation": "Problem.evaluate Problem._evaluate",
     "list[LqKnot]": "Problem.derivatives",
     "ManyRollouts": "rollout_many",

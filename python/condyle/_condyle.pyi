@@ -135,6 +135,7 @@ __all__ = [
     "_generate",
     "_lend",
     "_model_from_bytes",
+    "_solve_many",
     "_spelled_crba",
     "_spelled_difference",
     "_spelled_integrate",
@@ -2859,9 +2860,6 @@ class ArmMpc:
     def report(self) -> Report:
         """The `Report` of the last tick."""
 
-    def policy(self) -> JointPolicy:
-        """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
-
     def place(self, name: str, placement: ArrayLike, velocity: ArrayLike | None = None, t: float = 0.0) -> None:
         """Sets the placement of an obstacle and its velocity. Later ticks plan with its motion at constant velocity. A
         call for each measurement of the obstacle corrects the motion.
@@ -2872,6 +2870,9 @@ class ArmMpc:
 
         Raises `ControllerError` if no pair has this obstacle, or for a number that is not finite.
         """
+
+    def policy(self) -> JointPolicy:
+        """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
 
     def reset(self, x: ArrayLike, path: ArrayLike | Callable[[float], ArrayLike], t: float = 0.0) -> None:
         """Begins anew in a state, whose joints are the posture from which the arm deviates as little as the path allows.
@@ -5155,6 +5156,32 @@ def rollout_many(
     >>> found = rollout_many(problem, us, gradients=True)
     >>> found.costs.shape, found.xs.shape, found.du.shape
     ((1000,), (1000, 26, 14), (1000, 25, 7))
+    """
+
+def _solve_many(
+    solver: Fddp,
+    count: int,
+    data: dict[str, Any],
+    start: tuple[Any, Any],
+    vary: tuple[Callable[..., object], list[Any]] | None,
+    keep: list[str],
+    threads: int,
+    report: Callable[[int], object] | None,
+) -> tuple[dict[str, Any], list[tuple[int, BaseException]]]:
+    """Solves variations of a problem: see `condyle.optimal.solve_many` and `condyle.sweep`.
+
+    solver: the settings of all solves.
+    count: the number V of variations.
+    data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name of a cost, numbers) called
+        "references" and "weights", with the numbers of all knots in a row.
+    start: the states and controls from which all variations start.
+    vary: None, or a function of the problem and an item that changes the problem or returns another one.
+    items: the arguments of `vary`.
+    keep: the arrays of each solution to keep.
+    report: None, or a function that is called with the number of variations that have ended.
+
+    Returns the columns of `Variations`, without `error`; the status of a variation that did not start is empty. Also
+    returns the exceptions of the variations that failed, as pairs (index, exception).
     """
 
 def joint_torque_regressor(

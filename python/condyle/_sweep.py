@@ -304,9 +304,9 @@ class Worker:
 
     def _in_lanes(self, first: int, items: Any) -> _Rows:
         job = self._job
-        solver = self._same or Fddp(job.problem, **job.settings)
+        solver = Fddp(job.problem, **job.settings)
         vary = (job.vary, list(items)) if job.vary else None
-        data = {} if job.vary else {"x0": np.ascontiguousarray(items, float)}
+        data: dict[str, Any] = {} if job.vary else {"x0": np.ascontiguousarray(items, float)}
         found, wrong = _solve_many(solver, len(items), data, job.start, vary, list(job.keep), 1, None)
         return _columns(job, found, wrong, first)
 

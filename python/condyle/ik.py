@@ -293,8 +293,8 @@ class DifferentialIk:
         """The tasks."""
         given = None
         if distances is not None:
-            pairs, *numbers = distances
-            given = (_encoded(model, pairs), *map(float, numbers))
+            pairs, minimum, look_ahead, largest, reach = distances
+            given = (_encoded(model, pairs), float(minimum), float(look_ahead), float(largest), float(reach))
         self._inner = _DifferentialIk(model, list(self.tasks), dt, damping, limits, given)
 
     def hold(self, q: ArrayLike) -> Targets:
