@@ -142,7 +142,7 @@ def test_frames_are_added() -> None:
     with pytest.raises(condyle.ModelError, match="^unknown frame `tol`; nearest is `tool`$"):
         arm.with_frame("tip", "tol")
     with pytest.raises(condyle.ModelError, match="^frame `tip`: placement is no rotation and translation$"):
-        arm.with_frame("tip", "tool", 2.0 * np.eye(4))
+        arm.with_frame("tip", "tool", np.diag([2.0, 2.0, 2.0, 1.0]))
     with pytest.raises(IndexError, match="^frame: expected a name or 0 to .*, found 99$"):
         arm.with_frame("tip", 99)
 

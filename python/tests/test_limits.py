@@ -173,7 +173,7 @@ def test_what_is_infeasible_is_proved() -> None:
     solver = AugmentedLagrangian(problem)
     solution = solver.solve(np.tile(X0, (4, 1)), np.tile(knot.quasi_static(X0), (3, 1)))
     assert solution.status == "infeasible"
-    assert solver.outcome.worst == ("constraint", 0, 2, "bent", 2, 0.5)
+    assert solver.outcome.worst == ("constraint", 0, 2, "bent", 2, 0.5, None)
 
 
 def test_a_start_is_moved_into_the_bounds() -> None:

@@ -64,7 +64,7 @@ def test_obstacles_move_and_far_pairs_are_bounds() -> None:
     with pytest.raises(ValueError, match="no geometry is named 'bal'"):
         pairs.place("bal", away)
     with pytest.raises(ValueError, match="expected a rotation"):
-        pairs.place("ball", 2 * away)
+        pairs.place("ball", away @ np.diag([2.0, 2.0, 2.0, 1.0]))
 
 
 def test_residuals_take_geometries() -> None:
