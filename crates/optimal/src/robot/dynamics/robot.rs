@@ -1,6 +1,8 @@
 //! Dynamics of a robot, for all kinds of dynamics: accelerations, costs and limits for a group of knots.
 #![allow(non_snake_case)] // names follow the literature: J
 
+mod across;
+
 use super::batch::{DynamicsKind, Group, KnotBatch, LaneTerms, Long, Pass, Short};
 use super::group_kernel::BLOCK;
 use super::impact::Impact;
@@ -367,25 +369,6 @@ impl RobotDynamics {
     /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
         self.solve_with(group, &[]);
-    }
-
-    /// Computes the dynamics of one knot of several problems into the workspace, in one batch. `each` has the costs and
-    /// limits of each lane; `None` stands for the costs and limits of this robot.
-    pub(crate) fn solve_across(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
-        self.solve_with(group, each);
-    }
-
-    /// Exchanges the results at one knot of the last group with the results at the first knot of another robot.
-    pub(crate) fn exchange(&mut self, lane: usize, other: &mut Self) {
-        core::mem::swap(&mut self.parts().work.data[lane], &mut other.parts().work.data[0]);
-    }
-
-    /// Returns whether both robots have the same dynamics, and knot t of both reads the same quantities: the knots may
-    /// be computed in one batch.
-    pub(crate) fn matches(&self, other: &Self, t: usize) -> bool {
-        Arc::ptr_eq(&self.model, &other.model)
-            && (&self.kind, &self.actuation, &self.capabilities) == (&other.kind, &other.actuation, &other.capabilities)
-            && self.terms.at(t, true).is_alike(other.terms.at(t, true))
     }
 
     /// Computes the dynamics of a group, whose lanes may belong to several robots.

@@ -1,6 +1,7 @@
 //! Integrators, which compute the next state from accelerations, and knots with a duration.
 
 mod accelerations;
+mod across;
 mod controls;
 mod curvature;
 mod euler;
@@ -11,13 +12,13 @@ mod runge_kutta;
 use super::continuous::{ContinuousModel, Derivatives, KnotInput};
 use super::dynamics::batch::Group;
 use super::dynamics::robot::RobotDynamics;
-use super::horizon::{HorizonTerms, PerKnot, PerModel};
+use super::horizon::{PerKnot, PerModel};
 use super::knot_data::{OnDemand, WIDEST};
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
 use crate::problem::{Evaluation, KnotGroup, Results, Visit, quasi_static};
 use crate::{ActionModel, Error, GroupModel};
-use accelerations::{ROBOT, robot, robot_mut, slopes, solve, values};
+use accelerations::{robot, robot_mut, slopes, solve, values};
 pub use controls::ControlPolynomial;
 use controls::widen;
 use curvature::Curvature;
@@ -169,12 +170,6 @@ impl<M: ContinuousModel> Integrated<M> {
     fn assert_knot(&self, x: &[f64], u: &[f64]) {
         assert_length("x", x.len(), self.nx());
         assert_length("u", u.len(), self.nu());
-    }
-
-    /// Returns an action that [matches](KnotGroup::matches) this one, with its type.
-    fn of_action(action: &mut dyn ActionModel) -> &mut Self {
-        let action: &mut dyn Any = action;
-        action.downcast_mut().expect("actions that match have the same type")
     }
 
     /// Returns whether several states can be computed in one batch. This excludes Runge–Kutta methods, which compute
@@ -344,58 +339,16 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         }
     }
 
-    /// Computes the dynamics of all lanes in the batch of this action. The action of each lane then computes the lane's
-    /// costs and step from these dynamics.
     #[track_caller]
     fn evaluate_across(
         &mut self,
         others: &mut [&mut dyn ActionModel],
         of: &[usize],
         t: usize,
-        [xs, us]: [&[f64]; 2],
+        trajectory: [&[f64]; 2],
         results: &mut Results<'_>,
     ) -> bool {
-        let (nx, nu, count) = (self.nx(), self.nu(), of.len());
-        if GroupModel::lanes(self) < count {
-            return false;
-        }
-        self.set_limits_in_cost(true);
-        let mut each: [Option<&HorizonTerms>; WIDEST] = [None; WIDEST];
-        for other in &mut *others {
-            let other = Self::of_action(&mut **other);
-            other.set_limits_in_cost(true);
-            other.parts();
-        }
-        for (each, &k) in each.iter_mut().zip(of).filter(|(_, k)| **k > 0) {
-            let other: &dyn Any = &*others[k - 1];
-            *each = other.downcast_ref::<Self>().and_then(|other| Some(&robot(&other.inner)?.terms));
-        }
-        let group =
-            Group { knots: &[t; WIDEST][..count], xs, us, what: Evaluation::Values, limited: true, durations: &[] };
-        robot_mut(&mut self.inner).expect(ROBOT).solve_across(group, &each[..count]);
-        let motion = KnotGroup::inverse_dynamics(self).map_or(0, |(size, _)| size);
-        let room = results.motions.len() / count;
-        for (lane, &k) in of.iter().enumerate() {
-            let input = KnotInput { t, x: &xs[lane * nx..][..nx], u: &us[lane * nu..][..nu] };
-            if motion.min(room) > 0 {
-                let robot = robot_mut(&mut self.inner).expect(ROBOT);
-                robot.copy_motion(lane, &mut results.motions[lane * room..][..motion]);
-            }
-            let (next, cost) = (&mut results.next[lane * nx..][..nx], &mut results.costs[lane]);
-            if k == 0 {
-                *cost = self.step(lane, input, self.duration_of(t), next);
-                continue;
-            }
-            let other = Self::of_action(&mut *others[k - 1]);
-            let mut exchange = |other: &mut Self| {
-                let (own, other) = (robot_mut(&mut self.inner), robot_mut(&mut other.inner));
-                own.expect(ROBOT).exchange(lane, other.expect(ROBOT));
-            };
-            exchange(other);
-            *cost = other.step(0, input, other.duration_of(t), next);
-            exchange(other);
-        }
-        true
+        self.values_across(others, of, t, trajectory, results)
     }
 
     fn matches(&self, other: &dyn ActionModel, t: usize) -> bool {
