@@ -1,5 +1,7 @@
 """Tests of `condyle.torch.ProblemLayer`: gradients, warm starts, types and errors."""
 
+import importlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -308,3 +310,14 @@ def test_a_second_differentiation_is_an_error() -> None:
     (slope,) = torch.autograd.grad(layer(goal)[1].sum(), goal, create_graph=True)
     with pytest.raises(NotImplementedError, match="ProblemLayer: second derivatives of a solution do not exist"):
         slope.sum().backward()
+
+
+def test_learning_of_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[1] / "examples"))
+    example = importlib.import_module("learn_weights")
+    report = example.run(motions=8)
+    expert = [example.EXPERT[name] for name in example.NAMES[:3]]  # noise hides the fourth weight
+    assert np.allclose(report.weights[-1, :3], expert, rtol=0.1)
+    assert report.losses[-1] < 2.2 and report.losses[0] > 1e3  # noise alone has the loss 2
+    before, after = report.errors
+    assert after < 0.01 * before
