@@ -1,8 +1,8 @@
 """The class `ProblemLayer` that `condyle.torch` and `condyle.jax` have in common: solutions and adjoints, row by row.
 
-A row is one problem of a batch. Its parameters p are numbers of the framework; its solution is (x(p), u(p)). For a loss
-with the gradient l with respect to the solution, the derivatives dL/dp = lᵀ d(x, u)/dp come from `Sensitivity`, whose
-adjoint method solves M a = l at the solution, with the factors of M that all parameters share.
+A row is one problem of a batch, with the parameters p and the solution w(p) = (x, u). Let l be the gradient of a loss L
+with respect to w. Then dL/dp = lᵀ dw/dp comes from the adjoint method of `Sensitivity`. This method solves M a = l with
+the factors of M, which all parameters share.
 """
 
 import threading
@@ -26,8 +26,11 @@ BOUNDED: Mapping[str, Any] = {"tolerance_bounded": 1e-20, "second_order": True}
 """Further settings, of `Fddp` only."""
 FIRST: Mapping[str, Any] = {"tolerance": 1e-9, "tolerance_bounded": 5e-5, "second_order": False}
 """Settings of the first phase far from a solution, where the curvature of the dynamics can make a step fail."""
-KEPT: Mapping[str, Any] = {"tolerance": 1.0, "tolerance_bounded": 1.0}
-"""Settings with which a solve that begins at a solution returns this solution."""
+KEPT: Mapping[str, Any] = {"tolerance": 1.0, "tolerance_bounded": 1.0, "regularisation_start": 1e8}
+"""Settings with which `Fddp` keeps a solution from which it starts: two iterations move it by 1e-10.
+
+The first iteration of a solve ignores bounds. Without the high regularisation, its step is rejected several times.
+"""
 
 
 class States:
@@ -165,7 +168,11 @@ class Solves:
     ) -> None:
         self.problem, self.parameters, self.states, self.solver = problem, parameters, states, solver
         self.curvature, self._start = curvature, start
-        self._settings = {k: v for k, v in solver.settings.items() if k in FIRST}
+        fast = isinstance(solver, Fddp)
+        self._settings = {k: v for k, v in solver.settings.items() if fast and k in {**FIRST, **KEPT}}
+        self._kept = dict(KEPT) if fast else {}
+        if fast:
+            self._kept["regularisation_start"] = min(1e8, solver.settings["regularisation_max"])
         us = problem.quasi_static(np.tile(problem.x0, (problem.horizon + 1, 1))) if start is None else start[1]
         self._sizes = [len(u) for u in us]
         self.nu = max(self._sizes, default=0)
@@ -200,8 +207,8 @@ class Solves:
 
     @contextmanager
     def _with(self, settings: Mapping[str, Any]) -> Iterator[None]:
-        """Solves with other settings, as far as the solver has them."""
-        self.solver.configure(**{k: v for k, v in settings.items() if k in self._settings})
+        """Changes settings during the block."""
+        self.solver.configure(**settings)
         try:
             yield
         finally:
@@ -277,7 +284,7 @@ class Solves:
             if known is None:  # a rounded solution of an earlier call
                 solution = self.solver.solve(xs, self._cut(us))
             else:
-                with self._with(KEPT):
+                with self._with(self._kept):
                     solution = self.solver.solve(*known)
             if solution.status != "converged":
                 raise ProblemError(f"the solve ended with {solution.status!r}, expected 'converged'")

@@ -146,14 +146,14 @@ def test_gradients_of_quaternions_rotations_and_placements() -> None:
 
 
 def test_batches_equal_single_problems() -> None:
-    layer = ProblemLayer(arm_problem(1e3), ["target/reach", "weight/reach"])
+    layer = ProblemLayer(arm_problem(), ["target/reach", "weight/reach"])
     goals = torch.tensor(GOAL) + 0.05 * torch.randn(2, 2, 3, generator=torch.Generator().manual_seed(1)).double()
     weight = parameter(20.0)
     goals.requires_grad_()
     xs, us = layer(goals, weight)
     assert xs.shape == (2, 2, KNOTS + 1, 14) and us.shape == (2, 2, KNOTS, 7)
     by_goals, by_weight = torch.autograd.grad(loss(xs, us)[0].sum(), [goals, weight])
-    single, total = ProblemLayer(arm_problem(1e3), ["target/reach", "weight/reach"]), 0.0
+    single, total = ProblemLayer(arm_problem(), ["target/reach", "weight/reach"]), 0.0
     for i in np.ndindex(2, 2):
         goal = goals[i].detach().requires_grad_()
         found = single(goal, weight)
