@@ -10,8 +10,10 @@ import pytest
 import condyle
 from condyle.optimal import (
     Activation,
+    ContactDynamics,
     Cost,
     FreeDynamics,
+    ImpulseDynamics,
     InteriorPoint,
     Limit,
     Problem,
@@ -143,6 +145,44 @@ def test_gradients_of_quaternions_rotations_and_placements() -> None:
         ProblemLayer(problem, names)
     with pytest.raises(ValueError, match="robot: expected the robot of the problem, .* found 'arm7'"):
         ProblemLayer(problem, names, robot=ARM)
+
+
+def test_a_quadruped_in_contact_with_an_impact() -> None:
+    """Differentiates through contacts, and through a knot without controls, with respect to all numbers of a state."""
+    robot = condyle.robots.quadruped()
+    q = condyle.neutral(robot)
+    q[7:] = np.tile([0.0, 0.7, -1.4], 4)
+    x0 = np.r_[q, np.zeros(robot.nv)]
+    x0[2] = 0.4
+    feet = {
+        name: condyle.ContactConstraint(name, "point", kd=20.0) for name in ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
+    }
+    rest = Cost("rest", 1.0, Residual.state(x0), Activation.weighted(np.r_[np.full(18, 5.0), np.full(18, 0.1)]))
+    com = Cost("com", 20.0, Residual.center_of_mass([0.02, 0.0, 0.4]))
+
+    def effort(n: int) -> Cost:
+        return Cost("effort", 1e-2, Residual.control(np.zeros(n)))
+
+    models = [
+        FreeDynamics(robot, 0.02, [rest, effort(12)]),
+        ImpulseDynamics(robot, feet, [rest]),
+        ContactDynamics(robot, feet, 0.02, [rest, com, effort(12)]),
+    ]
+    problem = Problem(x0, models, [0, 0, 1, 2, 2, 2], FreeDynamics(robot, None, [rest]))
+    layer = ProblemLayer(problem, ["x0", "target/com", "target/rest"], robot=robot)
+    start = torch.tensor(x0)
+    start[3:7] = torch.tensor([0.05, -0.08, 0.02, 1.1])
+    goal, rest_at = torch.tensor([0.02, 0.0, 0.4]).double(), torch.tensor(x0)
+    xs, us = layer(start, goal, rest_at)
+    assert us.shape == (6, 12) and not us[2].any() and us[1].any()  # the impact has no controls
+    a, b = (torch.tensor(np.random.default_rng(1).standard_normal(y.shape)) for y in (xs, us))
+
+    def value(xs: Any, us: Any) -> Any:
+        return 1e-2 * (xs.sin() * a).sum() + 1e-3 * (us * b).sum()
+
+    check(lambda x: value(*layer(x, goal, rest_at)), start.clone().requires_grad_())
+    check(lambda x: value(*layer(start, x, rest_at)), goal.clone().requires_grad_())
+    check(lambda x: value(*layer(start, goal, x)), rest_at.clone().requires_grad_())
 
 
 def test_batches_equal_single_problems() -> None:
