@@ -76,6 +76,9 @@ def test_warm_starts_are_kept() -> None:
     first = layer.iterations
     jax.block_until_ready(layer(goals[::-1] + 1e-3, rows=["b", "a"]))
     assert all(a < b for a, b in zip(layer.iterations, reversed(first), strict=True))
+    jax.block_until_ready(layer(goals, rows=jnp.array([5, 7])))
+    jax.block_until_ready(layer(goals + 1e-3, rows=[5, 7]))
+    assert all(a < b for a, b in zip(layer.iterations, first, strict=True))
 
 
 def test_types() -> None:

@@ -224,6 +224,9 @@ def test_warm_starts_are_kept() -> None:
     layer(goals, rows=["a", "b"])
     first = layer.iterations
     assert layer.statuses == ["converged", "converged"]
+    layer(goals, rows=torch.tensor([5, 7]))  # numbers are equal names in tensors and lists
+    layer(goals + 1e-3, rows=[5, 7])
+    assert all(a < b for a, b in zip(layer.iterations, first, strict=True))
     layer(goals.flip(0) + 1e-3, rows=["b", "a"])  # the rows keep their solutions in any order
     second = layer.iterations
     assert all(a < b for a, b in zip(second, reversed(first), strict=True))
