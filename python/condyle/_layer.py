@@ -28,7 +28,12 @@ bounds, and changes the number of iterations without bounds by 2 % (arms with 8 
 """
 FIRST: Mapping[str, Any] = {"tolerance": 1e-9, "tolerance_bounded": 5e-5, "second_order": False}
 """Settings of the first phase far from a solution, where the curvature of the dynamics can make a step fail."""
-KEPT: Mapping[str, Any] = {"tolerance": 1.0, "tolerance_bounded": 1.0, "regularisation_start": 1e8}
+KEPT: Mapping[str, Any] = {
+    "tolerance": 1.0,
+    "tolerance_bounded": 1.0,
+    "regularisation_start": 1e8,
+    "regularisation_max": 1e30,
+}
 """Settings with which `Fddp` keeps a solution from which it starts: two iterations move it by 1e-10.
 
 The first iteration of a solve ignores bounds. Without the high regularisation, its step is rejected several times.
@@ -170,11 +175,8 @@ class Solves:
     ) -> None:
         self.problem, self.parameters, self.states, self.solver = problem, parameters, states, solver
         self.curvature, self._start = curvature, start
-        fast = isinstance(solver, Fddp)
-        self._settings = {k: v for k, v in solver.settings.items() if fast and k in {**FIRST, **KEPT}}
-        self._kept = dict(KEPT) if fast else {}
-        if fast:
-            self._kept["regularisation_start"] = min(1e8, solver.settings["regularisation_max"])
+        self._kept = KEPT if isinstance(solver, Fddp) else {}
+        self._settings = {k: v for k, v in solver.settings.items() if k in {**FIRST, **self._kept} and self._kept}
         us = problem.quasi_static(np.tile(problem.x0, (problem.horizon + 1, 1))) if start is None else start[1]
         self._sizes = [len(u) for u in us]
         self.nu = max(self._sizes, default=0)
@@ -283,11 +285,11 @@ class Solves:
         if self._at != name:
             self._set(values)
             known = self._solved.get(name)
-            if known is None:  # a rounded solution of an earlier call
-                solution = self.solver.solve(xs, self._cut(us))
-            else:
+            if known is not None:
                 with self._with(self._kept):
                     solution = self.solver.solve(*known)
+            if known is None or solution.status != "converged":  # a rounded solution of an earlier call
+                solution = self.solver.solve(*(known or (xs, self._cut(us))))
             if solution.status != "converged":
                 raise ProblemError(f"the solve ended with {solution.status!r}, expected 'converged'")
             self._at = name
