@@ -28,7 +28,7 @@ from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensiti
 KNOTS = 50
 CURVATURES = ("exact", "dynamics", "gauss_newton")
 TIGHT = {
-    **{"max_iterations": 1000, "tolerance": 1e-20, "tolerance_bounded": 1e-20, "flat": 1e-6},
+    **{"max_iterations": 300, "tolerance": 1e-20, "tolerance_bounded": 1e-20, "flat": 1e-6},
     **{"second_order": True, "regularisation_start": 1e-3},
 }
 """The default settings of a layer."""

@@ -20,7 +20,7 @@ from ._coordinates import Coordinates
 _Array = NDArray[np.float64]
 _Shape = tuple[int | None, ...]
 
-TIGHT: Mapping[str, Any] = {"max_iterations": 1000, "tolerance": 1e-20, "flat": 1e-6}
+TIGHT: Mapping[str, Any] = {"max_iterations": 300, "tolerance": 1e-20, "flat": 1e-6}
 """Default settings of a solver: the error of a derivative is proportional to the error of the solution."""
 BOUNDED: Mapping[str, Any] = {"tolerance_bounded": 1e-20, "second_order": True, "regularisation_start": 1e-3}
 """Further settings, of `Fddp` only. The regularisation saves a fifth of the iterations from a warm start with active
