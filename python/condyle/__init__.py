@@ -79,7 +79,7 @@ Modules: `optimal` (FDDP, DDP and their problems), `distances` (between shapes),
     (controllers at a rate), `wholebody` (control), `simulation`, `algebra` (poses, motions, forces), `conventions`
     (other libraries' numbers). Further modules must be imported by name: `casadi`, `pinocchio` (Pinocchio's names of
     functions), `crocoddyl` (Crocoddyl's problems), `codegen` (straight-line C), `cuda` (kernels), `torch` and `jax`
-    (differentiable operations of PyTorch and JAX) and `viz` (pictures)
+    (dynamics and solutions of problems as differentiable operations of PyTorch and JAX) and `viz` (pictures)
 """
 
 from . import algebra, conventions, distances, ik, inertial_parameters, mpc, optimal, robots, simulation, wholebody

@@ -1,4 +1,4 @@
-"""Functions of a robot as differentiable operations of JAX, on batches of states.
+"""Functions of a robot, and solutions of problems, as differentiable operations of JAX, on batches.
 
 >>> import condyle, condyle.jax, jax, jax.numpy as jnp
 >>> arm = condyle.jax.Dynamics(condyle.robots.arm7())
@@ -21,16 +21,19 @@ Derivatives with respect to a position have nq numbers. They are derivatives of 
 `condyle.casadi`: the gradient has no component along a quaternion. The derivative of `f(integrate(q, d))` with respect
 to d, at d = 0, is the derivative in the tangent space, with nv numbers.
 
+`ProblemLayer` is the solution of an optimal control problem as an operation.
+
 JAX is an optional dependency: `pip install condyle[jax]`. The tests use version 0.10.2.
 """
 
 import importlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from . import _dynamics
+from . import _dynamics, _layer
 from ._condyle import Model
 from ._operations import Operation, Shape, Slot
 
@@ -45,9 +48,21 @@ _batching: Any = importlib.import_module("jax.interpreters.batching")
 _mlir: Any = importlib.import_module("jax.interpreters.mlir")
 _Primitive: Any = importlib.import_module("jax.extend.core").Primitive
 
-__all__ = ["Dynamics"]
+__all__ = ["Dynamics", "ProblemLayer"]
 
 Call = Callable[..., Sequence[Any]]
+
+
+def _floats(names: Sequence[str], values: Sequence[Any]) -> list[Any]:
+    """Returns the arguments as arrays with one type of floating-point numbers."""
+    arrays = []
+    for name, value in zip(names, values, strict=True):
+        array = jnp.asarray(value)
+        if array.dtype not in (jnp.float32, jnp.float64):
+            raise TypeError(f"{name}: expected float32 or float64, found {array.dtype}")
+        arrays.append(array)
+    kind = jnp.result_type(*arrays)
+    return [array.astype(kind) for array in arrays]
 
 
 def _primitive(name: str, compute: Call, slots: Callable[[Operation], Sequence[Slot]]) -> Any:
@@ -272,14 +287,7 @@ class Dynamics(_dynamics.Dynamics):
         self._spans = [*spans, (slice(at, model.nq), False)]
 
     def _arrays(self, names: Sequence[str], values: Sequence[Any]) -> list[Any]:
-        arrays = []
-        for name, value in zip(names, values, strict=True):
-            array = jnp.asarray(value)
-            if array.dtype not in (jnp.float32, jnp.float64):
-                raise TypeError(f"{name}: expected float32 or float64, found {array.dtype}")
-            arrays.append(array)
-        kind = jnp.result_type(*arrays)
-        return [array.astype(kind) for array in arrays]
+        return _floats(names, values)
 
     def _expand(self, array: Any, shape: Shape) -> Any:
         return jnp.broadcast_to(array, shape)
@@ -293,3 +301,104 @@ class Dynamics(_dynamics.Dynamics):
             part = q[..., span]
             parts.append(part / jnp.linalg.norm(part, axis=-1, keepdims=True) if unit else part)
         return jnp.concatenate(parts, -1)
+
+
+def _solution(layer: "ProblemLayer", keys: Any, *p: Any) -> Any:
+    """Returns the solution (x(p), u(p)) of a layer."""
+    cut = p[0].ndim - len(layer._solves.parameters[0].shape)
+    shapes = [jax.ShapeDtypeStruct((*p[0].shape[:cut], *end), p[0].dtype) for end in layer._ends]
+
+    def host(*p: Any) -> Any:
+        return layer._solution(keys, [np.asarray(a) for a in p])
+
+    return tuple(jax.pure_callback(host, shapes, *p, vmap_method="broadcast_all"))
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _adjoint(layer: "ProblemLayer", *tensors: Any) -> Any:
+    """Returns dL/dp for the parameters p, x(p), u(p), ∂L/∂x and ∂L/∂u."""
+    p = tensors[:-4]
+
+    def host(*tensors: Any) -> Any:
+        arrays = [np.asarray(a) for a in tensors]
+        return layer._slopes(arrays[:-4], arrays[-4:], (True,) * len(p))
+
+    shapes = [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in p]
+    return tuple(jax.pure_callback(host, shapes, *tensors, vmap_method="broadcast_all"))
+
+
+def _adjoint_forward(layer: "ProblemLayer", *_: Any) -> Any:
+    raise layer._only_once()
+
+
+_adjoint.defvjp(_adjoint_forward, _adjoint_forward)
+_solve = jax.custom_vjp(_solution, nondiff_argnums=(0, 1))
+
+
+def _solve_forward(layer: "ProblemLayer", keys: Any, *p: Any) -> Any:
+    solution = _solve(layer, keys, *p)
+    return solution, (*p, *solution)
+
+
+def _solve_backward(layer: "ProblemLayer", keys: Any, kept: Any, slopes: Any) -> Any:
+    return _adjoint(layer, *kept, *slopes)
+
+
+_solve.defvjp(_solve_forward, _solve_backward)
+
+
+class ProblemLayer(_layer.ProblemLayer):
+    """The solution of an optimal control problem as a differentiable function of its parameters.
+
+    A call `xs, us = layer(*values)` solves a problem for each row of the batch, one after the other, and returns states
+    (*batch, N + 1, nx) and controls (*batch, N, nu). If knots differ in nu, controls end with zeros. A problem starts
+    from the last solution of its row, or else from `start`. The backward pass multiplies by the derivative of the
+    solution by `condyle.optimal.Sensitivity`: one factorisation for each row, then one adjoint pass for each parameter.
+    `jax.jit`, `grad`, `vmap` and `jacrev` work; compiled programs call the solver by `jax.pure_callback`.
+
+    problem: the problem, which the layer changes; do not use it elsewhere.
+    parameters: names of the parameters, in the order of a call's arguments. "x0" is the initial state, (nx); also
+        "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n).
+    by_knot: the names of parameters with a value for each knot, whose shapes begin with N + 1.
+    robot: the robot, if its positions contain quaternions or pairs (cos, sin). Gradients are then as in `Dynamics`.
+    solver: `Fddp` (default), `InteriorPoint` or `AugmentedLagrangian`.
+    start: states and controls from which a row's first solve starts; None for x0 at rest at all knots.
+    curvature: as for `Sensitivity`.
+    on_failure: "raise", or "nan" for NaN in the solution of a row that has not converged. The row's gradients are NaN,
+        or zero if the loss does not depend on the row.
+    settings: settings of the solver, by name. The default tolerances are tight, because the error of a gradient is
+        proportional to the error of the solution.
+
+    Arrays have float32 or float64 numbers, and all computations use float64. Second derivatives raise
+    `NotImplementedError`, and forward mode (`jvp`) is a `TypeError`. Wrong shapes are a `ValueError`; integers are a
+    `TypeError`. If a solve has not converged, or derivatives do not exist, JAX raises its `JaxRuntimeError`, whose text
+    contains the `ProblemError` with the row.
+
+    >>> import condyle, condyle.jax, jax, jax.numpy as jnp, numpy as np
+    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> rest, effort = Cost("rest", 0.1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
+    >>> reach = Cost("reach", 10.0, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))
+    >>> knot, last = FreeDynamics(arm, 0.05, [rest, effort, reach]), FreeDynamics(arm, None, [rest, reach])
+    >>> problem = Problem(x0, [knot], [0] * 10, last)
+    >>> layer = condyle.jax.ProblemLayer(problem, ["target/reach", "weight/effort"])
+    >>> goals = jnp.array([[0.4, 0.2, 0.5], [0.3, 0.3, 0.5]])
+    >>> slope = jax.jit(jax.grad(lambda weight: (layer(goals, weight)[1] ** 2).sum()))
+    >>> bool(slope(1e-3) < 0.0)  # a higher weight lowers the efforts
+    True
+    """
+
+    @property
+    def _ends(self) -> list[Shape]:
+        """The shapes of the states and controls of one problem."""
+        horizon = self._solves.problem.horizon
+        return [(horizon + 1, self._solves.problem.nx), (horizon, self._solves.nu)]
+
+    def _arrays(self, names: Sequence[str], values: Sequence[Any]) -> list[Any]:
+        return _floats(names, values)
+
+    def _expand(self, array: Any, shape: tuple[int, ...]) -> Any:
+        return jnp.broadcast_to(array, shape)
+
+    def _apply(self, keys: tuple[Hashable, ...] | None, arrays: Sequence[Any]) -> tuple[Any, Any]:
+        return _solve(self, keys, *arrays)  # type: ignore[no-any-return]

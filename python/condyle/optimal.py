@@ -24,6 +24,7 @@ functions accept numbers that carry their derivatives. `ControlRate` adds a cost
 to knot to an action of any kind.
 
 `Sensitivity` differentiates a solution with respect to initial state, targets, weights, bounds and other parameters.
+`condyle.torch.ProblemLayer` and `condyle.jax.ProblemLayer` do so inside PyTorch and JAX.
 
 The feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. The iterates are the same as in
 Crocoddyl.

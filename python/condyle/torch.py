@@ -1,4 +1,4 @@
-"""Functions of a robot as differentiable operations of PyTorch, on batches of states.
+"""Functions of a robot, and solutions of problems, as differentiable operations of PyTorch, on batches.
 
 >>> import condyle, condyle.torch, torch
 >>> arm = condyle.torch.Dynamics(condyle.robots.arm7())
@@ -22,15 +22,17 @@ Derivatives with respect to a position have nq numbers. They are derivatives of 
 need `integrate`: the derivative of `f(integrate(q, d))` with respect to d, at d = 0, is the derivative in the tangent
 space.
 
+`ProblemLayer` is the solution of an optimal control problem as an operation.
+
 PyTorch is an optional dependency: `pip install condyle[torch]`. The tests use version 2.15.
 """
 
 import importlib
 import inspect
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
-from . import _dynamics
+from . import _dynamics, _layer
 from ._condyle import Model
 from ._operations import Operation, Shape
 
@@ -39,7 +41,7 @@ try:
 except ImportError:
     raise ImportError("condyle.torch needs PyTorch: pip install condyle[torch]") from None
 
-__all__ = ["Dynamics"]
+__all__ = ["Dynamics", "ProblemLayer"]
 
 
 def _numpy(tensors: Sequence[Any]) -> list[Any]:
@@ -50,6 +52,23 @@ def _tensors(arrays: Sequence[Any], like: Any) -> tuple[Any, ...]:
     return tuple(
         torch.from_numpy(array.copy() if not array.flags.writeable else array).to(like.dtype) for array in arrays
     )
+
+
+def _floats(names: Sequence[str], values: Sequence[Any]) -> list[Any]:
+    """Returns the arguments as tensors on the CPU, with one type of floating-point numbers."""
+    tensors = []
+    for name, value in zip(names, values, strict=True):
+        tensor = torch.as_tensor(value)
+        if tensor.dtype not in (torch.float32, torch.float64):
+            raise TypeError(f"{name}: expected float32 or float64, found {str(tensor.dtype).removeprefix('torch.')}")
+        if tensor.device.type != "cpu":
+            raise ValueError(
+                f"{name}: expected a tensor on the CPU, where Condyle computes, found device {tensor.device}; "
+                f"use {name}.cpu()"
+            )
+        tensors.append(tensor)
+    widest = torch.float64 if any(t.dtype == torch.float64 for t in tensors) else torch.float32
+    return [tensor if tensor.dtype == widest else tensor.to(widest) for tensor in tensors]
 
 
 def _zeros(tensors: Sequence[Any], like: Sequence[Any]) -> list[Any]:
@@ -73,6 +92,14 @@ def _full(operation: Operation, cotangents: Sequence[Any], x: Sequence[Any]) -> 
     ]
 
 
+def _in_front(info: Any, in_dims: Sequence[int | None], tensors: Sequence[Any]) -> list[Any]:
+    """Returns the tensors of a batch of calls, with the batch as the first axis."""
+    return [
+        tensor.unsqueeze(0).expand(info.batch_size, *tensor.shape) if at is None else tensor.movedim(at, 0)
+        for tensor, at in zip(tensors, in_dims, strict=True)
+    ]
+
+
 class _Function(torch.autograd.Function):  # type: ignore[misc]
     """An operation with arguments (operation, needed, *tensors): the common part of four functions.
 
@@ -89,11 +116,7 @@ class _Function(torch.autograd.Function):  # type: ignore[misc]
     @classmethod
     def _mapped(cls, info: Any, in_dims: tuple[Any, ...], operation: Any, needed: Any, *tensors: Any) -> Any:
         """Returns the results of a batch of calls, with the batch as the first axis."""
-        moved = [
-            tensor.unsqueeze(0).expand(info.batch_size, *tensor.shape) if at is None else tensor.movedim(at, 0)
-            for tensor, at in zip(tensors, in_dims[2:], strict=True)
-        ]
-        results = cls.apply(operation, needed, *moved)
+        results = cls.apply(operation, needed, *_in_front(info, in_dims[2:], tensors))
         return results, tuple(0 for _ in results)
 
 
@@ -294,21 +317,7 @@ class Dynamics(_dynamics.Dynamics):
         self._spans = [*spans, (slice(at, model.nq), False)]
 
     def _arrays(self, names: Sequence[str], values: Sequence[Any]) -> list[Any]:
-        tensors = []
-        for name, value in zip(names, values, strict=True):
-            tensor = torch.as_tensor(value)
-            if tensor.dtype not in (torch.float32, torch.float64):
-                raise TypeError(
-                    f"{name}: expected float32 or float64, found {str(tensor.dtype).removeprefix('torch.')}"
-                )
-            if tensor.device.type != "cpu":
-                raise ValueError(
-                    f"{name}: expected a tensor on the CPU, where Condyle computes, found device {tensor.device}; "
-                    f"use {name}.cpu()"
-                )
-            tensors.append(tensor)
-        widest = torch.float64 if any(t.dtype == torch.float64 for t in tensors) else torch.float32
-        return [tensor if tensor.dtype == widest else tensor.to(widest) for tensor in tensors]
+        return _floats(names, values)
 
     def _expand(self, array: Any, shape: Shape) -> Any:
         return array.expand(shape)
@@ -322,3 +331,105 @@ class Dynamics(_dynamics.Dynamics):
             part = q[..., span]
             parts.append(part / torch.linalg.vector_norm(part, dim=-1, keepdim=True) if unit else part)
         return torch.cat(parts, -1)
+
+
+class _Solve(torch.autograd.Function):  # type: ignore[misc]
+    """The function p -> (x(p), u(p)) of a layer, with arguments (layer, keys, *p)."""
+
+    @staticmethod
+    def forward(layer: Any, keys: Any, *p: Any) -> Any:
+        return _tensors(layer._solution(keys, _numpy(p)), p[0])
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+        ctx.layer = inputs[0]
+        ctx.save_for_backward(*inputs[2:], *output)
+
+    @staticmethod
+    def backward(ctx: Any, by_xs: Any, by_us: Any) -> Any:
+        needed = ctx.needs_input_grad[2:]
+        slopes = _Adjoint.apply(ctx.layer, needed, *ctx.saved_tensors, by_xs, by_us)
+        return None, None, *(g if n else None for g, n in zip(slopes, needed, strict=True))
+
+    @staticmethod
+    def vmap(info: Any, in_dims: Any, layer: Any, keys: Any, *tensors: Any) -> Any:
+        results = _Solve.apply(layer, keys, *_in_front(info, in_dims[2:], tensors))
+        return results, tuple(0 for _ in results)
+
+
+class _Adjoint(torch.autograd.Function):  # type: ignore[misc]
+    """The function (p, x, u, ∂L/∂x, ∂L/∂u) -> dL/dp of a layer, with arguments (layer, needed, ...)."""
+
+    @staticmethod
+    def forward(layer: Any, needed: Any, *tensors: Any) -> Any:
+        arrays = _numpy(tensors)
+        return _tensors(layer._slopes(arrays[:-4], arrays[-4:], needed), tensors[0])
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+        pass
+
+    @staticmethod
+    def backward(ctx: Any, *_: Any) -> Any:
+        raise _layer.ProblemLayer._only_once()
+
+    @staticmethod
+    def vmap(info: Any, in_dims: Any, layer: Any, needed: Any, *tensors: Any) -> Any:
+        results = _Adjoint.apply(layer, needed, *_in_front(info, in_dims[2:], tensors))
+        return results, tuple(0 for _ in results)
+
+
+for _kind in (_Solve, _Adjoint):
+    _kind.forward.__signature__ = inspect.signature(_kind.forward)
+
+
+class ProblemLayer(_layer.ProblemLayer):
+    """The solution of an optimal control problem as a differentiable function of its parameters.
+
+    A call `xs, us = layer(*values)` solves a problem for each row of the batch, one after the other, and returns states
+    (*batch, N + 1, nx) and controls (*batch, N, nu). If knots differ in nu, controls end with zeros. A problem starts
+    from the last solution of its row, or else from `start`. The backward pass multiplies by the derivative of the
+    solution by `condyle.optimal.Sensitivity`: one factorisation for each row, then one adjoint pass for each parameter.
+
+    problem: the problem, which the layer changes; do not use it elsewhere.
+    parameters: names of the parameters, in the order of a call's arguments. "x0" is the initial state, (nx); also
+        "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n).
+    by_knot: the names of parameters with a value for each knot, whose shapes begin with N + 1.
+    robot: the robot, if its positions contain quaternions or pairs (cos, sin). Gradients are then as in `Dynamics`.
+    solver: `Fddp` (default), `InteriorPoint` or `AugmentedLagrangian`.
+    start: states and controls from which a row's first solve starts; None for x0 at rest at all knots.
+    curvature: as for `Sensitivity`.
+    on_failure: "raise", or "nan" for NaN in the solution of a row that has not converged. The row's gradients are NaN,
+        or zero if the loss does not depend on the row.
+    settings: settings of the solver, by name. The default tolerances are tight, because the error of a gradient is
+        proportional to the error of the solution.
+
+    Tensors have float32 or float64 numbers, and all computations use float64. Second derivatives raise
+    `NotImplementedError`. Wrong shapes, and tensors that are not on the CPU, are a `ValueError`; integers are a
+    `TypeError`. Raises `ProblemError` with the row and the status if a solve has not converged, or with the row if its
+    derivatives do not exist.
+
+    >>> import condyle, condyle.torch, numpy as np, torch
+    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> rest, effort = Cost("rest", 0.1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
+    >>> reach = Cost("reach", 10.0, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))
+    >>> knot, last = FreeDynamics(arm, 0.05, [rest, effort, reach]), FreeDynamics(arm, None, [rest, reach])
+    >>> problem = Problem(x0, [knot], [0] * 10, last)
+    >>> layer = condyle.torch.ProblemLayer(problem, ["target/reach", "weight/effort"])
+    >>> goals = torch.tensor([[0.4, 0.2, 0.5], [0.3, 0.3, 0.5]])
+    >>> weight = torch.tensor(1e-3, requires_grad=True)  # the same for both goals
+    >>> xs, us = layer(goals, weight)
+    >>> us.square().sum().backward()
+    >>> xs.shape, us.shape, bool(weight.grad < 0.0)  # a higher weight lowers the efforts
+    (torch.Size([2, 11, 14]), torch.Size([2, 10, 7]), True)
+    """
+
+    def _arrays(self, names: Sequence[str], values: Sequence[Any]) -> list[Any]:
+        return _floats(names, values)
+
+    def _expand(self, array: Any, shape: tuple[int, ...]) -> Any:
+        return array.expand(shape)
+
+    def _apply(self, keys: tuple[Hashable, ...] | None, arrays: Sequence[Any]) -> tuple[Any, Any]:
+        return _Solve.apply(self, keys, *arrays)  # type: ignore[no-any-return]

@@ -28,6 +28,8 @@ def test_example(path: Path, tmp_path: Path) -> None:
         pytest.importorskip("example_robot_data")
     if path.stem == "learn_residual":
         pytest.importorskip("jax")
+    if path.stem == "learn_weights":
+        pytest.importorskip("torch")
     if path.stem == "wholebody_clarabel":
         pytest.importorskip("clarabel")
     if path.stem in ("pictures", "drag_target"):
