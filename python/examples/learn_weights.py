@@ -1,6 +1,6 @@
 """Learns the weights of a controller's cost from an expert's motions, by the adjoint of the solutions, with PyTorch.
 
-An expert moves a two-link arm by a controller whose weights nobody knows. The learner has the same kind of cost and
+An expert moves a two-link arm by a controller with unknown weights. The learner has the same kind of cost and
 other weights w. It solves its problem for each recorded motion and compares positions and torques with the expert's:
 
     L(w) = Σ ‖q(w) − q*‖² / σ_q² + Σ ‖u(w) − u*‖² / σ_u²,    (x(w), u(w)) = argmin of the problem with weights w
