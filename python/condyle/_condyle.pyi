@@ -5036,7 +5036,7 @@ class Sensitivity:
             parameter that only this knot uses, such as the rows of `Problem.references`.
 
         Raises `ProblemError` if the parameter does not exist, or if the problem has changed since this object was
-        created.
+        created and the derivatives of this parameter are not stored yet. Stored ones belong to the solved problem.
         """
 
     def jacobian(self, parameter: str) -> tuple[_Array, _Array | list[_Array]]:

@@ -177,6 +177,9 @@ def solve_many(
 ) -> Variations:
     """Solves many problems of one shape by `Fddp`, several at a time in SIMD lanes.
 
+    Bounds on controls hold. As in `Fddp`, limits of knots only add costs, which do not enforce them: for problems with
+    limits, use `condyle.sweep` with `InteriorPoint` or `AugmentedLagrangian`.
+
     Each problem has its own step lengths, regularisation and convergence. The result of a problem does not depend on
     the other problems, to the bit. It may differ by rounding from the result of `Fddp` alone.
 
@@ -196,7 +199,8 @@ def solve_many(
     Returns `Variations`. The error of a problem is stored in its row, and does not affect the others. For more problems
     than fit into memory, and for variations that change the model or the contacts, use `condyle.sweep`.
 
-    Raises ValueError for invalid arguments, and `ProblemError` for an `Action` in Python, which cannot be copied.
+    Raises ValueError for invalid arguments, KeyError for a cost that no knot has, and `ProblemError` for an `Action` in
+    Python, which cannot be copied.
 
     >>> arm, rest = condyle.robots.arm7(), np.zeros(14)
     >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual, solve_many
@@ -217,7 +221,7 @@ def solve_many(
         for name, values in (references or {}).items()
     ]
     scales = [(name, _by_knot("weights", name, values, rows, ())) for name, values in (weights or {}).items()]
-    states = None if x0 is None else np.asarray(x0, float)
+    states = None if x0 is None else _real("x0", x0)
     counts = {name: len(values) for name, values in targets + scales}
     if states is not None and states.ndim != 1:
         counts["x0"] = len(_states(problem, states, "x0"))
@@ -245,15 +249,24 @@ def solve_many(
         found, wrong = _solve_many(solver, count, data, job.start, None, list(keep), threads, watcher)
         if progress:
             tell(count)
+        if len(wrong) == count and all(isinstance(error, KeyError) for _, error in wrong):
+            raise wrong[0][1]
     finally:
         report(None)
     table = _table([_columns(job, found, wrong)])
     return table._replace(status=np.where(table.status == "", "not_started", table.status))
 
 
+def _real(argument: str, values: ArrayLike) -> _Array:
+    """Returns the numbers as an array of floats."""
+    if np.iscomplexobj(values):
+        raise TypeError(f"{argument}: expected real numbers, found complex ones")
+    return np.asarray(values, float)
+
+
 def _by_knot(argument: str, name: str, values: ArrayLike, rows: int, shape: tuple[int, ...]) -> _Array:
     """Returns the numbers of all knots of each problem in a row, from numbers for each knot or for all knots."""
-    found = np.asarray(values, float)
+    found = _real(argument, values)
     if found.shape[1:] == shape and found.ndim > 0:
         found = np.repeat(found[:, None], rows, axis=1)
     if found.ndim != 2 + len(shape) or found.shape[1:] != (rows, *shape):

@@ -134,7 +134,7 @@ impl Sensitivity {
     ///     parameter that only this knot uses, such as the rows of `Problem.references`.
     ///
     /// Raises `ProblemError` if the parameter does not exist, or if the problem has changed since this object was
-    /// created.
+    /// created and the derivatives of this parameter are not stored yet. Stored ones belong to the solved problem.
     #[pyo3(signature = (parameter, by_xs=None, by_us=None, by_knot=false))]
     fn gradient<'py>(
         &self,
