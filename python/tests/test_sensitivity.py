@@ -207,5 +207,5 @@ def test_errors(arm, loss):
     problem.set_weight("reach", 40.0)
     with pytest.raises(ProblemError, match="has changed since the sensitivity was created"):
         sensitivity.gradient("target/reach", *loss)
-    with pytest.raises(ProblemError, match="has not converged, or the problem has changed since the solve"):
+    with pytest.raises(ProblemError, match="the solution is inexact, or the problem has changed since the solve"):
         Sensitivity(solver)

@@ -245,6 +245,21 @@ fn a_wrong_problem_fails_alone() {
 }
 
 #[test]
+fn a_solve_that_fails_at_once_has_no_gains() {
+    let wild = |i: usize, problem: &mut Problem| {
+        vary_arm(i, problem)?;
+        let speed = if i == 5 { 1e200 } else { 0.0 }; // the cost overflows
+        let x0 = [&problem.x0()[..7], &[speed; 7]].concat();
+        problem.set_x0(&x0)
+    };
+    let mut solver = BatchFddp::new(&arm(false), 1).unwrap();
+    together(&mut solver, &[4; 8], &wild); // all slots have gains
+    let row = together(&mut solver, &[5], &wild).remove(0).unwrap();
+    assert_eq!((row.status, row.iterations), (Status::NotFinite, 0));
+    assert!(row.gains.iter().all(|gain| *gain == 0.0));
+}
+
+#[test]
 fn time_and_the_receiver_end_a_call() {
     let indices: Vec<usize> = (0..100).collect();
     let mut solver = BatchFddp::new(&arm(false), 1).unwrap();

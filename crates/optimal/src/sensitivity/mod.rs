@@ -136,9 +136,9 @@ impl Sensitivity {
     }
 
     /// Returns the derivatives of the optimality conditions with respect to a parameter, for
-    /// [`Adjoint::gradient`] and [`forward`](Self::forward). One evaluation of the problem checks that it has not
-    /// changed. Weights take one more for each entry, other parameters two. The problem has its old values afterwards.
-    /// Allocates.
+    /// [`Adjoint::gradient`] and [`forward`](Self::forward). One evaluation of the problem detects changes since this
+    /// object was created. A weight takes one further evaluation for each entry; another parameter takes two. The
+    /// problem has its old values afterwards. Allocates.
     ///
     /// # Errors
     /// [`Error::Sensitivity`] if the problem does not have the parameter, or has changed since this sensitivity was

@@ -103,8 +103,8 @@ impl Point {
         for (what, residual) in [("gradient of the Lagrangian", report.stationarity), ("gap", report.primal)] {
             if residual.is_nan() || residual > settings.tolerance {
                 return Err(wrong(format!(
-                    "the largest {what} is {residual:.3e}, expected at most the tolerance {:.3e}: the solution has not \
-                     converged, or the problem has changed since the solve",
+                    "the largest {what} is {residual:.3e}, expected at most {:.3e}: the solution is inexact, or the \
+                     problem has changed since the solve",
                     settings.tolerance
                 )));
             }

@@ -105,8 +105,6 @@ struct Worker {
     trials: Trials,
     /// Linear-quadratic problem and sweep, which all slots use in turn, so that they stay in the caches.
     linear: Linear,
-    /// Solver of a problem that cannot share lanes.
-    alone: Option<Fddp>,
 }
 
 /// Storage of a linear-quadratic problem, and its sweep.
@@ -142,7 +140,7 @@ struct Queue<'a, P> {
     settings: &'a Settings,
     count: usize,
     next: AtomicUsize,
-    /// Reason why no more iterations are made.
+    /// Whether the time is over; the next field is whether the receiver of the solutions has ended the call.
     is_over: AtomicBool,
     is_interrupted: AtomicBool,
     begin: Instant,
@@ -265,7 +263,7 @@ impl Worker {
         let slots = (0..width).map(|_| slot()).collect::<Result<_, Error>>()?;
         let knots = SolverLoop::knots_of(&nominal);
         let linear = Linear { sweep: Sweep::new(&knots), knots };
-        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, linear, alone: None })
+        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, linear })
     }
 
     /// Solves problems until the queue is empty or a reason to stop exists.
@@ -293,7 +291,7 @@ impl Worker {
 
     /// Begins problem `index` in slot k. A problem that cannot share lanes is solved at once.
     fn begin<P: ManyProblems>(&mut self, k: usize, index: usize, queue: &Queue<'_, P>) {
-        let Self { nominal, start, slots, alone, linear, .. } = self;
+        let Self { nominal, start, slots, linear, .. } = self;
         let Slot { problem, solver, .. } = &mut slots[k];
         let begin = Instant::now();
         let [mut xs, mut us] = start.clone();
@@ -302,7 +300,7 @@ impl Worker {
             return queue.problems.solved(index, problem, Err(error));
         }
         if !problem.matches(nominal) {
-            let alone = alone.get_or_insert_with(|| Fddp::new(nominal));
+            let mut alone = Fddp::new(nominal);
             alone.settings = queue.settings.clone();
             let result = alone.solve(problem, &xs, &us).map_err(P::Error::from);
             return queue.problems.solved(index, problem, result);
@@ -310,6 +308,7 @@ impl Worker {
         solver.exchange(&mut linear.knots, &mut linear.sweep, false);
         let begun = solver.begin(problem, queue.settings, Some([&xs, &us]));
         let now = begun.map(|()| {
+            solver.forget_gains();
             solver.start_clock(queue.settings, &Watch::new(&mut Unobserved));
             solver.start_pass(problem, queue.settings, Pass::default())
         });

@@ -517,6 +517,13 @@ impl SolverLoop {
         now.swept = false;
     }
 
+    /// Sets the gains of the solution to zero, as in a new solver.
+    pub(super) fn forget_gains(&mut self) {
+        let solution = &mut self.iterate.solution;
+        solution.K.iter_mut().for_each(|K| K.fill(0.0));
+        solution.k.iter_mut().for_each(|k| k.fill(0.0));
+    }
+
     /// Exchanges the linear-quadratic problem and the sweep of this loop for `knots` and `sweep`. The next sweep starts
     /// from the feed-forward in the solution, if this loop has `swept` before.
     pub(super) fn exchange(&mut self, knots: &mut Vec<LqKnot>, sweep: &mut Sweep, swept: bool) {

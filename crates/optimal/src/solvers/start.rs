@@ -121,8 +121,8 @@ impl SolverLoop {
         if settings.project_warm_start {
             solution.project(problem, 0..problem.horizon());
         }
-        solution.K.iter_mut().for_each(|gains| gains.fill(0.0));
-        solution.k.iter_mut().for_each(|k| k.fill(0.0));
+        self.forget_gains();
+        let solution = &mut self.iterate.solution;
         solution.trace.clear();
         (solution.cost, solution.gap, solution.feasible) = (f64::INFINITY, f64::INFINITY, false);
         (solution.status, solution.fallback) = (Status::MaxIterations, Some(Fallback::HeldStill));

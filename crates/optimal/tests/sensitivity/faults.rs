@@ -40,7 +40,7 @@ fn faults_are_named() {
     let late = sensitivity.jacobian(&mut problem, &"target/reach".parse().unwrap()).unwrap_err().to_string();
     assert_eq!(late, "sensitivity: knot 0 of the problem has changed since the sensitivity was created");
     let changed = text(Sensitivity::new(&mut problem, &solution, None, settings()));
-    assert!(changed.contains("has not converged, or the problem has changed since the solve"), "{changed}");
+    assert!(changed.contains("the solution is inexact, or the problem has changed since the solve"), "{changed}");
 }
 
 /// Checks that parameters are vectors that can be read and set by their names.

@@ -2,8 +2,9 @@
 #![allow(non_snake_case)] // names follow the literature: J
 
 mod across;
+mod curvature;
 
-use super::batch::{DynamicsKind, Group, KnotBatch, LaneTerms, Long, Pass, Short};
+use super::batch::{DynamicsKind, Group, KnotBatch, LaneTerms, Long, Short};
 use super::group_kernel::BLOCK;
 use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
@@ -12,7 +13,7 @@ use super::sensitivities::DynamicsSensitivities;
 use super::shared_data::SharedData;
 use super::still::Still;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqKnot};
+use crate::lq::LqKnot;
 use crate::problem::{Evaluation, innermost};
 use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, SHARED, check_contacts, constraint_set, moved_by};
@@ -25,8 +26,8 @@ use crate::robot::state::{GroupHessian, groups};
 use crate::{ActionModel, Error};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics,
-    gravity, integrate, integrate_jacobian_groups, neutral,
+    ConstraintSet, ContactConstraint, Data, IntegrateArgument, Model, constrained_inverse_dynamics, gravity, integrate,
+    integrate_jacobian_groups, neutral,
 };
 use condyle_linalg::Aligned;
 use condyle_spatial::Scalar;
@@ -368,11 +369,13 @@ impl RobotDynamics {
     /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, in one batch if that is
     /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
-        self.solve_with(group, &[]);
+        self.solve_across(group, &[]);
     }
 
-    /// Computes the dynamics of a group, whose lanes may belong to several robots.
-    fn solve_with(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
+    /// Computes the dynamics of a group, in one batch if its lanes belong to several robots. `each` has the costs and
+    /// limits of each lane; `None` stands for the costs and limits of this robot. If all lanes belong to this robot,
+    /// `each` is empty.
+    pub(crate) fn solve_across(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
         let Group { knots, xs, us, what, durations, .. } = group;
         if let Evaluation::Equations { motions, .. } = what {
             match motions.is_empty() {
@@ -535,55 +538,6 @@ impl RobotDynamics {
         if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ), or u
     }
 
-    /// Computes the second derivatives of [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
-    pub(crate) fn hessian(
-        &mut self,
-        KnotInput { x, u, .. }: KnotInput<'_>,
-        mu: &[f64],
-        hessian: &mut Hessian,
-    ) -> Option<Derivatives<'_>> {
-        let Parts { model, actuation, work, .. } = self.parts();
-        let Work { single: KnotBatch { data, pass, .. }, data: knots, da_du, .. } = work;
-        let knot = &mut knots[0];
-        match pass {
-            Pass::Free => {
-                actuation.effort(u, &mut knot.tau);
-                let (nv, (q, v)) = (model.nv(), x.split_at(model.nq()));
-                let data = &mut *data.get();
-                let d = aba_hessian(model, data, q, v, &knot.tau, &[], mu);
-                for c in 0..nv {
-                    for r in 0..nv {
-                        hessian.xx[(r, c)] = d.dqdq[(r, c)];
-                        hessian.xx[(nv + r, c)] = d.dvdq[(r, c)];
-                        hessian.xx[(c, nv + r)] = d.dvdq[(r, c)];
-                        hessian.xx[(nv + r, nv + c)] = d.dvdv[(r, c)];
-                    }
-                    let column = &d.dtaudq.as_slice()[c * nv..][..nv];
-                    for k in 0..u.len() {
-                        hessian.xu[(c, k)] = actuation.along(k, column); // Sᵀ ∂²ψ/∂τ∂q
-                        hessian.xu[(nv + c, k)] = 0.0;
-                    }
-                }
-                hessian.uu.fill(0.0);
-                let [da_dq, da_dv, da_dtau] = &mut knot.da;
-                da_dq.copy_from(d.first.da_dq);
-                da_dv.copy_from(d.first.da_dv);
-                da_dtau.copy_from(d.first.da_dtau);
-                knot.a.copy_from_slice(d.first.a);
-                Some(Derivatives { a: &knot.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) })
-            }
-            Pass::Inverse | Pass::ContactInverse(..) => {
-                knot.a.copy_from_slice(&u[..model.nv()]);
-                for part in [&mut hessian.xx, &mut hessian.xu, &mut hessian.uu] {
-                    part.fill(0.0); // accelerations that are controls have no second derivatives
-                }
-                let [da_dq, da_dv, da_du] = &knot.da;
-                Some(Derivatives { a: &knot.a, da_dq, da_dv, da_du: da_du.as_slice() })
-            }
-            _ => None,
-        }
-    }
-
     /// Computes the blocks of groups in the Jacobians ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
     pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Position, by_q);
@@ -594,11 +548,5 @@ impl RobotDynamics {
     /// [`KnotData::steps`].
     pub(crate) fn steps(&self, lane: usize) -> Option<&[f64]> {
         self.work.made().map(|work| &work.data[lane].steps[..])
-    }
-
-    /// Computes the second derivatives of λᵀ(q ⊕ δq) with respect to q and δq.
-    pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
-        let Parts { model, groups, work, .. } = self.parts();
-        work.group_hessian.run(model, groups, dq, lambda, hessian);
     }
 }

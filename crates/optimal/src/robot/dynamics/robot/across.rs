@@ -1,17 +1,9 @@
 //! Dynamics of one knot of several problems, in one batch.
 
 use super::RobotDynamics;
-use crate::robot::dynamics::batch::Group;
-use crate::robot::horizon::HorizonTerms;
 use std::sync::Arc;
 
 impl RobotDynamics {
-    /// Computes the dynamics of one knot of several problems into the workspace, in one batch. `each` has the costs and
-    /// limits of each lane; `None` stands for the costs and limits of this robot.
-    pub(crate) fn solve_across(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
-        self.solve_with(group, each);
-    }
-
     /// Exchanges the results at one knot of the last group with the results at the first knot of another robot.
     pub(crate) fn exchange(&mut self, lane: usize, other: &mut Self) {
         core::mem::swap(&mut self.parts().work.data[lane], &mut other.parts().work.data[0]);
