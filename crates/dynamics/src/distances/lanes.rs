@@ -1,6 +1,7 @@
 //! Distances and gradients of many pairs, with one pair per lane of a SIMD register.
 
 use super::round::{Round, capsules, spheres};
+use alloc::vec::Vec;
 use condyle_spatial::block::Block;
 use condyle_spatial::gate::{Level, level};
 use condyle_spatial::{Scalar, Vec3, register_kernel};
@@ -102,15 +103,42 @@ pub(crate) fn compute(items: &[Item], rounds: &[Row], of_spheres: bool, results:
 #[repr(align(64))]
 pub(crate) struct Columns(pub [f64; PADDING]);
 
+/// Number of components of a joint column: its linear and its angular velocity.
+pub(crate) const COMPONENTS: usize = 6;
+
+/// Coordinates that change the distances of a pair of bodies.
+#[derive(Clone, Debug)]
+pub(crate) struct Signs {
+    /// Signs of the columns, block by block: 1 for a column that moves only the first body, −1 for the second, 0 for
+    /// others.
+    pub signs: Vec<Columns>,
+    /// Bit j: whether block j has a sign that is not 0. All blocks from 63 on share the last bit.
+    pub blocks: u64,
+}
+
+impl Signs {
+    /// Returns signs that are all 0.
+    pub(crate) fn new(blocks: usize) -> Self {
+        Self { signs: vec![Columns::default(); blocks], blocks: 0 }
+    }
+
+    /// Sets the sign of a coordinate.
+    pub(crate) fn set(&mut self, coordinate: usize, sign: f64) {
+        let block = coordinate / PADDING;
+        self.signs[block].0[coordinate % PADDING] = sign;
+        self.blocks |= 1 << block.min(LAST);
+    }
+}
+
+/// Index of the last bit of [`Signs::blocks`].
+const LAST: usize = 63;
+
 /// Numbers from which gradients are computed.
 pub(crate) struct Slopes<'a> {
-    /// Joint columns S: for each of the six components, `blocks` entries.
+    /// Joint columns S: the six components of the first block, then of the second block, and so on.
     pub columns: &'a [Columns],
-    /// Number of blocks of columns.
-    pub blocks: usize,
-    /// Signs, `blocks` entries for each pair of bodies: 1 for a column that moves only the first body, −1 for the
-    /// second, 0 for others.
-    pub signs: &'a [Columns],
+    /// Signs of the columns for each pair of bodies.
+    pub signs: &'a [Signs],
     /// Index of the pair of bodies of each pair of shapes.
     pub sign_of: &'a [u32],
     /// Results of each pair.
@@ -121,53 +149,38 @@ pub(crate) struct Slopes<'a> {
 
 /// Returns the force n at the point p of a result: n, and the moment p × n about the origin.
 #[inline(always)]
-fn force<V: Block<Number = f64>>(row: &Row) -> [V; 6] {
+fn force<V: Block<Number = f64>>(row: &Row) -> [V; COMPONENTS] {
     let (n, p) = (vector(row, 4), vector(row, 1));
     let m = p.cross(n);
     [V::splat(n.x), V::splat(n.y), V::splat(n.z), V::splat(m.x), V::splat(m.y), V::splat(m.z)]
 }
 
-/// Computes the gradients nᵀ (J₁ − J₂) of K pairs from pair k on. A row is written with its padding, which the first
-/// block of the next row overwrites. So the last blocks are computed first.
-#[inline(always)]
-fn some_rows<V: Block<Number = f64>, const K: usize>(s: &Slopes<'_>, k: usize, to: &mut [f64]) {
-    let mut f = [[V::zero(); 6]; K];
-    for j in 0..K {
-        f[j] = force(&s.results[k + j]);
-    }
-    for j in (0..s.blocks).rev() {
-        let mut at = 0;
-        while at < PADDING {
-            let mut sums = [V::zero(); K];
-            for i in 0..6 {
-                let column = V::load(&s.columns[i * s.blocks + j].0[at..][..V::LANES]);
-                for j in 0..K {
-                    sums[j] = column.mul_add(f[j][i], sums[j]); // Sᵀ f
-                }
-            }
-            for i in 0..K {
-                let signs = V::load(&s.signs[s.sign_of[k + i] as usize * s.blocks + j].0[at..][..V::LANES]);
-                (sums[i] * signs).store(&mut to[(k + i) * s.nv + j * PADDING + at..][..V::LANES]);
-            }
-            at += V::LANES;
-        }
-    }
-}
-/// Number of pairs for which a column is loaded once; chosen because 100 gradients of 29 coordinates take 0.9 µs. They
-/// take 1.6 µs with 1, 1.05 µs with 2 and 1.1 µs with 4 pairs.
-const AT_ONCE: usize = 3;
-
-/// Computes the gradients of all pairs, row after row.
+/// Computes the gradients nᵀ (J₁ − J₂) of all pairs, row after row. A row is written with its padding, which the next
+/// row overwrites. Blocks without a sign are only filled with zeros: with 38 coordinates, half of the blocks.
 #[inline(always)]
 fn rows<V: Block<Number = f64>>(s: &Slopes<'_>, to: &mut [f64]) {
-    let (n, mut k) = (s.results.len(), 0);
-    while k + AT_ONCE <= n {
-        some_rows::<V, AT_ONCE>(s, k, to);
-        k += AT_ONCE;
-    }
-    while k < n {
-        some_rows::<V, 1>(s, k, to);
-        k += 1;
+    let (columns, _) = s.columns.as_chunks::<COMPONENTS>();
+    for (k, (result, &bodies)) in s.results.iter().zip(s.sign_of).enumerate() {
+        let f: [V; COMPONENTS] = force(result);
+        let Signs { signs, blocks } = &s.signs[bodies as usize];
+        let (row, _) = to[k * s.nv..][..columns.len() * PADDING].as_chunks_mut::<PADDING>();
+        for (j, ((column, signs), row)) in columns.iter().zip(signs).zip(row).enumerate() {
+            let moves = blocks >> j.min(LAST) & 1 == 1;
+            let mut at = 0;
+            while at < PADDING {
+                let mut sum = V::zero();
+                if moves {
+                    let (mut linear, mut angular) = (V::zero(), V::zero());
+                    for i in 0..3 {
+                        linear = V::load(&column[i].0[at..][..V::LANES]).mul_add(f[i], linear);
+                        angular = V::load(&column[i + 3].0[at..][..V::LANES]).mul_add(f[i + 3], angular);
+                    }
+                    sum = (linear + angular) * V::load(&signs.0[at..][..V::LANES]); // Sᵀ f
+                }
+                sum.store(&mut row[at..][..V::LANES]);
+                at += V::LANES;
+            }
+        }
     }
 }
 

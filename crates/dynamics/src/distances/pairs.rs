@@ -1,6 +1,6 @@
 //! Pairs of geometries, prepared for one robot.
 
-use super::lanes::{self, Columns, Item, PADDING, ROW, Row, Slopes};
+use super::lanes::{self, COMPONENTS, Columns, Item, PADDING, ROW, Row, Signs, Slopes};
 use super::prepared::Method;
 use super::results::Distances;
 use super::round::{Witness, norm};
@@ -96,10 +96,9 @@ pub struct DistancePairs {
     capsules: Vec<Item>,
     /// Indices of all other pairs.
     others: Vec<usize>,
-    /// Signs of columns for gradients in lanes: one row for each pair of bodies. Empty if coordinates drive several
-    /// columns.
-    signs: Vec<Columns>,
-    /// Row of signs of each pair.
+    /// Signs of columns for gradients in lanes, for each pair of bodies. Empty if coordinates drive several columns.
+    signs: Vec<Signs>,
+    /// Index of the signs of each pair.
     sign_of: Vec<u32>,
     replacements: Vec<Replacement>,
     cutoff: f64,
@@ -190,11 +189,11 @@ impl DistancePairs {
     /// Adds the signs of the columns between two bodies, unless `rows` already contains the bodies.
     fn add_signs(&mut self, bodies: [usize; 2], begin: usize, rows: &mut Vec<[usize; 2]>) {
         let row = rows.iter().position(|row| *row == bodies).unwrap_or_else(|| {
-            let (first, blocks) = (self.signs.len(), self.blocks());
-            self.signs.resize(first + blocks, Columns::default());
+            let mut signs = Signs::new(self.blocks());
             for path in &self.path[begin..] {
-                self.signs[first + path.coordinate / PADDING].0[path.coordinate % PADDING] = path.ratio;
+                signs.set(path.coordinate, path.ratio);
             }
+            self.signs.push(signs);
             rows.push(bodies);
             rows.len() - 1
         });
@@ -383,15 +382,17 @@ impl DistancePairs {
         self.evaluate(placements, distances);
         let columns = &placements.world.S;
         if !self.signs.is_empty() {
-            let blocks = self.blocks();
-            for (c, column) in columns.iter().enumerate() {
-                for (row, x) in column.to_array().into_iter().enumerate() {
-                    distances.columns[row * blocks + c / PADDING].0[c % PADDING] = x;
+            let (blocks, _) = distances.columns.as_chunks_mut::<COMPONENTS>();
+            for (columns, block) in columns.chunks(PADDING).zip(blocks) {
+                for (lane, column) in columns.iter().enumerate() {
+                    for (x, to) in column.to_array().into_iter().zip(&mut *block) {
+                        to.0[lane] = x;
+                    }
                 }
             }
             let Distances { columns, found, gradients, .. } = distances;
             let Self { signs, sign_of, nv, .. } = self;
-            lanes::gradients(&Slopes { columns, blocks, signs, sign_of, results: found, nv: *nv }, gradients);
+            lanes::gradients(&Slopes { columns, signs, sign_of, results: found, nv: *nv }, gradients);
         } else {
             distances.gradients.fill(0.0);
             for (k, pair) in self.pairs.iter().enumerate() {
@@ -514,7 +515,7 @@ impl Distances {
             found: vec![[0.0; ROW]; n],
             distances: vec![0.0; n],
             near: vec![false; n],
-            columns: vec![Columns::default(); 6 * blocks],
+            columns: vec![Columns::default(); COMPONENTS * blocks],
             gradients: vec![0.0; n * pairs.nv() + PADDING],
             nv: pairs.nv(),
         }

@@ -23,8 +23,8 @@ pub struct Distances {
     pub(crate) distances: Vec<f64>,
     /// Whether each pair is within the cutoff. Written by: `evaluate`.
     pub(crate) near: Vec<bool>,
-    /// Joint columns S in the world, one row for each component. Shape: 6 × blocks of columns. Written by:
-    /// `gradients`.
+    /// Joint columns S in the world, block by block, and component by component in a block. Shape: blocks of columns
+    /// × 6. Written by: `gradients`.
     pub(crate) columns: Vec<Columns>,
     /// Gradients with respect to the tangent of q, one row per pair, and padding after the last row. Shape: pairs × nv.
     /// Written by: `gradients`.
