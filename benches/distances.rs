@@ -21,10 +21,8 @@ fn pairs(model: &Model) -> Vec<GeometryPair> {
     let obstacles: Vec<_> = (0..20).map(obstacle).collect();
     let others = |i: usize| on_robot[i + 1..].iter().chain(&obstacles);
     let all = (0..on_robot.len()).flat_map(|i| others(i).map(move |other| (i, other)));
-    let mut all: Vec<_> = all.map(|(i, other)| GeometryPair::new(on_robot[i].clone(), other.clone())).collect();
-    let step = all.len().div_ceil(PAIRS).max(1);
-    all = all.into_iter().step_by(step).collect();
-    all.iter().cycle().take(PAIRS).cloned().collect()
+    let all: Vec<_> = all.map(|(i, other)| GeometryPair::new(on_robot[i].clone(), other.clone())).collect();
+    (0..PAIRS).map(|k| all[k * all.len() / PAIRS].clone()).collect()
 }
 
 fn distances(c: &mut Criterion) {

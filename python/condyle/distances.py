@@ -154,6 +154,8 @@ def _geometry(model: Model, geometry: Geometry) -> dict[str, Any]:
     if geometry.frame is not None:
         frame = geometry.frame
         index = frame if isinstance(frame, int) else model.frame(frame)
+        if not 0 <= index < len(model.frames):
+            raise IndexError(f"frame: expected an index below {len(model.frames)}, found {index}")
         found["frame"] = {"name": model.frames[index].name, "kind": model.frames[index].kind.title()}
     if geometry.placement is not None:
         pose = np.asarray(geometry.placement, dtype=float)
@@ -197,7 +199,9 @@ class DistancePairs:
 
     model: the robot; pairs: a list of pairs of `Geometry`.
 
-    Raises `ModelError` for an unknown frame, a negative size, a pair without a frame or a pair of half-spaces.
+    Raises `ModelError` for an unknown frame, a negative size and a pair without a frame. Other causes are two
+    half-spaces, a geometry with itself, two geometries of one moving body, a pair that is listed twice, and two
+    different geometries of one name.
     """
 
     def __init__(self, model: Model, pairs: Iterable[GeometryPair]) -> None:
@@ -337,7 +341,8 @@ class Collisions:
 
     @property
     def geometries(self) -> list[Geometry]:
-        """The shapes, in the order of the file. A shape without a name is named `link_k`."""
+        """The shapes, in the order of the file, with different names. A shape without a name, or with the name of an
+        earlier shape, is named `link_k`."""
         import json
 
         return [_read(geometry) for geometry in json.loads(self._inner._geometries())]

@@ -7,7 +7,7 @@ import pytest
 
 import condyle
 from condyle.distances import Collisions, DistancePairs, Geometry, Shape, distances
-from condyle.optimal import Activation, Cost, FreeDynamics, Problem, Residual
+from condyle.optimal import Activation, Cost, FreeDynamics, Problem, ProblemError, Residual
 
 ARM = condyle.robots.arm7()
 # Tolerance of sums of a few products, and of central differences with a step of 1e-6.
@@ -129,3 +129,43 @@ def test_wrong_shapes_are_errors() -> None:
     other = condyle.robots.quadruped()
     with pytest.raises(ValueError, match="made for another model"):
         distances(pairs, other, condyle.Data(other), condyle.neutral(other))
+
+
+def test_ambiguous_pairs_are_errors() -> None:
+    tip = Geometry(SHAPES[0], "tool", name="tip")
+    crate = Geometry(SHAPES[2], None, pose(0.3, 0.2, 0.5), "crate")
+    elbow = Geometry(SHAPES[1], "link4", name="elbow")
+
+    def refused(pairs: list[tuple[Geometry, Geometry]], message: str) -> None:
+        with pytest.raises(condyle.ModelError, match=message):
+            DistancePairs(ARM, pairs)
+        with pytest.raises(ProblemError, match=message):
+            FreeDynamics(ARM, None, [Cost("apart", 1.0, Residual.distances(ARM, pairs))])
+
+    text = r"pairs\[1\].second \(`crate`\): has the name of pairs\[0\].second, but another "
+    refused([(tip, crate), (elbow, crate._replace(shape=SHAPES[0]))], text + "shape")
+    refused([(tip, crate), (elbow, crate._replace(placement=None))], text + "placement")
+    refused([(tip, tip)], r"pairs\[0\] \(`tip` and `tip`\): is a geometry with itself")
+    refused([(tip, crate), (crate, tip)], r"pairs\[1\] \(`crate` and `tip`\): is the same pair as pairs\[0\]")
+    palm = Geometry(SHAPES[1], "tool", name="palm")
+    refused([(tip, palm)], r"pairs\[0\] \(`tip` and `palm`\): has two geometries of the body")
+    flat = Geometry(SHAPES[5], "tool")
+    refused([(flat, Geometry(SHAPES[5]))], "has two half-spaces")
+    with pytest.raises(ValueError, match="half_sizes of a box: expected finite numbers, found nan"):
+        DistancePairs(ARM, [(tip, Geometry(Shape.box([0.1, np.nan, 0.1])))])
+    for index in (-1, 99):
+        with pytest.raises(IndexError, match=f"frame: expected an index below {len(ARM.frames)}, found {index}"):
+            DistancePairs(ARM, [(Geometry(SHAPES[0], index), crate)])
+
+
+def test_an_obstacle_that_a_capsule_replaces_moves_in_all_pairs() -> None:
+    data, q = condyle.Data(ARM), np.full(7, 0.3)
+    can = Geometry(Shape.cylinder(0.1, 0.2), name="can")
+    parts = [Shape.sphere([0.0, 0.0, 0.0], 0.05), Shape.box([0.03, 0.03, 0.03])]
+    pairs = DistancePairs(ARM, [(Geometry(part, "tool"), can) for part in parts])
+    assert pairs.replacements == [(1, 1, "cylinder")]
+    above = np.eye(4)
+    above[:3, 3] = condyle.frame_placement(ARM, data, q, "tool")[:3, 3] + [0.0, 0.0, 3.0]
+    pairs.place("can", above)
+    found = distances(pairs, ARM, data, q).distance
+    assert abs(found[0] - 2.75) < ROUNDING and 2.6 < found[1] < 2.7

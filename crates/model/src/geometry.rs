@@ -2,10 +2,13 @@
 
 use crate::error::Error;
 use crate::frame_name::FrameName;
+use crate::magnitude::LARGEST;
 use crate::model::Model;
 use alloc::borrow::ToOwned;
+use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::String;
+use alloc::vec::Vec;
 use condyle_spatial::{Scalar, Se3, Vec3};
 use core::fmt;
 
@@ -100,6 +103,11 @@ fn is_identity(pose: &Se3<f64>) -> bool {
 /// Maximum deviation of the square of a normal's length from 1; chosen for numbers with seven digits in files.
 const UNIT: f64 = 1e-6;
 
+/// Returns whether a number is finite and not so large that distances overflow.
+fn is_allowed(x: f64) -> bool {
+    x.is_finite() && x.abs() <= LARGEST
+}
+
 impl Shape {
     /// Returns a sphere with a centre and a radius (m).
     pub fn sphere(center: impl Into<Vec3<f64>>, radius: f64) -> Self {
@@ -175,10 +183,11 @@ impl Shape {
 
     /// Checks the numbers of the shape. The text of an error begins with the name of the field.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let finite = |field: &str, numbers: &[f64]| match numbers.iter().find(|x| !x.is_finite()) {
+        let finite = |field: &str, numbers: &[f64]| match numbers.iter().find(|x| !is_allowed(**x)) {
             None => Ok(()),
             Some(x) if x.is_nan() => Err(format!("{field} holds a NaN")),
-            Some(_) => Err(format!("{field} holds an infinite number")),
+            Some(x) if x.is_infinite() => Err(format!("{field} holds an infinite number")),
+            Some(x) => Err(format!("{field} holds {x:e}, expected at most {LARGEST:e}")),
         };
         let positive = |field: &str, numbers: &[f64]| match numbers.iter().find(|&&x| x < 0.0) {
             Some(x) => Err(format!("{field} is {x}, expected at least 0")),
@@ -258,8 +267,11 @@ impl Geometry {
     fn checked(&self, model: &Model) -> Result<(usize, Se3<f64>), String> {
         self.shape.check()?;
         let Se3 { rotation, translation } = self.placement;
-        if !translation.to_array().iter().all(|x| x.is_finite()) {
-            return Err("placement.translation holds a number that is not finite".to_owned());
+        if let Some(x) = translation.to_array().iter().find(|x| !is_allowed(**x)) {
+            return Err(match x.is_finite() {
+                true => format!("placement.translation holds {x:e}, expected at most {LARGEST:e}"),
+                false => "placement.translation holds a number that is not finite".to_owned(),
+            });
         }
         if !rotation.is_rotation() {
             return Err("placement.rotation is not a rotation matrix".to_owned());
@@ -268,6 +280,17 @@ impl Geometry {
         let number = frame.number(model).map_err(|error| format!("frame: {error}"))?;
         let frame = &model.frames()[number];
         Ok((frame.body, frame.placement * self.placement))
+    }
+}
+
+impl Geometry {
+    /// Returns the first field in which two geometries of one name differ, for messages.
+    fn difference(&self, other: &Self) -> &'static str {
+        match (self.shape == other.shape, self.frame == other.frame) {
+            (false, _) => "shape",
+            (true, false) => "frame",
+            (true, true) => "placement",
+        }
     }
 }
 
@@ -298,21 +321,81 @@ impl GeometryPair {
     /// Returns body and pose of both geometries, as [`Geometry::resolve`] does.
     ///
     /// # Errors
-    /// Returns [`Error::Geometry`] for an invalid geometry, for two geometries without a frame, and for two
-    /// half-spaces. `index` is the index of the pair in the caller's list; the message contains it.
+    /// Returns [`Error::Geometry`] for an invalid geometry, and for a pair without a meaningful distance: two
+    /// geometries without a frame, a geometry with itself, two geometries of one moving body, two half-spaces. `index`
+    /// is the index of the pair in the caller's list; the message contains it.
     pub fn resolve(&self, model: &Model, index: usize) -> Result<[(usize, Se3<f64>); 2], Error> {
         let wrong = |geometry: String, what: String| Error::Geometry { geometry, what };
-        let named = |side: &str, geometry: &Geometry| format!("pairs[{index}].{side} ({geometry})");
+        let named = |side: usize, geometry: &Geometry| format!("pairs[{index}].{} ({geometry})", SIDES[side]);
         if self.first.frame.is_none() && self.second.frame.is_none() {
             let what = "has no frame: expected at least one geometry on the robot".to_owned();
             return Err(wrong(format!("pairs[{index}] ({self})"), what));
         }
-        let first = self.first.checked(model).map_err(|what| wrong(named("first", &self.first), what))?;
-        let second = self.second.checked(model).map_err(|what| wrong(named("second", &self.second), what))?;
-        if let (Shape::HalfSpace { .. }, Shape::HalfSpace { .. }) = (self.first.shape, self.second.shape) {
-            let what = "has two half-spaces, whose distance is not defined".to_owned();
-            return Err(wrong(format!("pairs[{index}] ({self})"), what));
+        let first = self.first.checked(model).map_err(|what| wrong(named(0, &self.first), what))?;
+        let second = self.second.checked(model).map_err(|what| wrong(named(1, &self.second), what))?;
+        let body = first.0;
+        let what = if self.first == self.second {
+            "is a geometry with itself: expected two different geometries".to_owned()
+        } else if let (Shape::HalfSpace { .. }, Shape::HalfSpace { .. }) = (self.first.shape, self.second.shape) {
+            "has two half-spaces, whose distance is not defined".to_owned()
+        } else if body > 0 && body == second.0 {
+            format!("has two geometries of the body `{}`, whose distance never changes", model.bodies()[body].name)
+        } else {
+            return Ok([first, second]);
+        };
+        Err(wrong(format!("pairs[{index}] ({self})"), what))
+    }
+
+    /// Returns bodies and poses of a list of pairs, as [`resolve`](Self::resolve) does for each pair.
+    ///
+    /// ```
+    /// use condyle_model::{Geometry, GeometryPair, Shape, robots};
+    /// let ball = |radius| Geometry::in_world(Shape::sphere([0.5, 0.0, 0.4], radius)).named("ball");
+    /// let tool = Geometry::on("tool", Shape::sphere([0.0; 3], 0.05));
+    /// let pairs = [0.1, 0.2].map(|radius| GeometryPair::new(tool.clone(), ball(radius)));
+    /// let error = GeometryPair::resolve_all(&robots::arm7(), &pairs).unwrap_err();
+    /// let text = "pairs[1].second (`ball`): has the name of pairs[0].second, but another shape";
+    /// assert_eq!(error.to_string(), text);
+    /// ```
+    ///
+    /// # Errors
+    /// Returns the errors of [`resolve`](Self::resolve). Returns [`Error::Geometry`] too if two different geometries
+    /// have one name, or if a pair is in the list twice, in either order.
+    pub fn resolve_all(model: &Model, pairs: &[Self]) -> Result<Vec<[(usize, Se3<f64>); 2]>, Error> {
+        // the different geometries, with the pair and the side that have them first
+        let mut all: Vec<(&Geometry, usize, usize)> = Vec::new();
+        let mut seen = BTreeMap::new();
+        let mut placed = Vec::with_capacity(pairs.len());
+        for (index, pair) in pairs.iter().enumerate() {
+            placed.push(pair.resolve(model, index)?);
+            let mut both = [0; 2];
+            for (side, geometry) in [&pair.first, &pair.second].into_iter().enumerate() {
+                if let Some(known) = all.iter().position(|(other, ..)| *other == geometry) {
+                    both[side] = known;
+                    continue;
+                }
+                let same_name = |(other, ..): &&(&Geometry, usize, usize)| other.name == geometry.name;
+                if let Some((other, k, at)) = all.iter().find(same_name).filter(|_| !geometry.name.is_empty()) {
+                    let what = format!(
+                        "has the name of pairs[{k}].{}, but another {}",
+                        SIDES[*at],
+                        geometry.difference(other)
+                    );
+                    let geometry = format!("pairs[{index}].{} ({geometry})", SIDES[side]);
+                    return Err(Error::Geometry { geometry, what });
+                }
+                both[side] = all.len();
+                all.push((geometry, index, side));
+            }
+            both.sort_unstable();
+            if let Some(first) = seen.insert(both, index) {
+                let what = format!("is the same pair as pairs[{first}]");
+                return Err(Error::Geometry { geometry: format!("pairs[{index}] ({pair})"), what });
+            }
         }
-        Ok([first, second])
+        Ok(placed)
     }
 }
+
+/// Names of both geometries of a pair, for messages.
+const SIDES: [&str; 2] = ["first", "second"];

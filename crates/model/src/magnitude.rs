@@ -7,9 +7,9 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
 
-/// Largest mass, length, inertia, gravity, armature, pitch or ratio in a model, in SI units. With this maximum, the
-/// inertia of the largest mass at the largest distance is 1e90, so its square does not overflow.
-const LARGEST: f64 = 1e30;
+/// Largest mass, length, inertia, gravity, armature, pitch or ratio in a model or a shape, in SI units. With this
+/// maximum, the inertia of the largest mass at the largest distance is 1e90, so its square does not overflow.
+pub(crate) const LARGEST: f64 = 1e30;
 
 impl Model {
     /// Checks that no number of a model is so large that the dynamics overflow.

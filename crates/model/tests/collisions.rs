@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use condyle_model::{
-    Collisions, Fit, Geometry, MjcfOptions, Model, SdfOptions, Shape, UrdfOptions, Vec3, neutral, robots,
+    Collisions, Fit, Geometry, GeometryPair, MjcfOptions, Model, SdfOptions, Shape, UrdfOptions, Vec3, neutral, robots,
 };
 use std::path::Path;
 
@@ -147,6 +147,33 @@ fn sdf_shapes() {
     assert_eq!(collisions.meshes().map(|mesh| &*mesh.file).collect::<Vec<_>>(), ["a.stl"]);
     let model = Model::from_sdf_str(sdf, &SdfOptions::default()).unwrap();
     assert!(collisions.pairs(&model).unwrap().is_empty()); // all are fixed to the world
+}
+
+/// Checks that shapes of one name on several links get different names, as masks and obstacles need.
+#[test]
+fn names_of_shapes_differ() {
+    let link = |name: &str, z: f64| {
+        let shape = |r: f64| format!("<geometry><sphere><radius>{r}</radius></sphere></geometry></collision>");
+        let (first, second) = (shape(0.1), shape(0.2));
+        format!(
+            "<link name='{name}'><pose>0 0 {z} 0 0 0</pose><collision name='collision'>{first}\
+            <collision name='{name}_0'>{second}</link>"
+        )
+    };
+    let joint = |parent: &str, child: &str| {
+        format!(
+            "<joint name='{child}' type='revolute'><parent>{parent}</parent><child>{child}</child>\
+            <axis><xyz>0 1 0</xyz></axis></joint>"
+        )
+    };
+    let [a, b, c] = [("a", 0.0), ("b", 1.0), ("c", 2.0)].map(|(name, z)| link(name, z));
+    let joints = [joint("world", "a"), joint("a", "b"), joint("b", "c")].concat();
+    let sdf = format!("<sdf version='1.9'><model name='m'>{a}{b}{c}{joints}</model></sdf>");
+    let collisions = Collisions::from_sdf_str(&sdf, &SdfOptions::default()).unwrap();
+    let found: Vec<_> = kinds(&collisions).into_iter().map(|(name, ..)| name).collect();
+    assert_eq!(found, ["collision", "a_0", "b_0", "b_1", "c_0", "c_1"]);
+    let model = Model::from_sdf_str(&sdf, &SdfOptions::default()).unwrap();
+    assert_eq!(GeometryPair::resolve_all(&model, &collisions.pairs(&model).unwrap()).unwrap().len(), 4);
 }
 
 /// Checks that shapes of embedded robots are on bodies of the robots, and that no pair is of one body or of neighbours.

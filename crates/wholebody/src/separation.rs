@@ -71,12 +71,10 @@ impl Separation {
         step.iter_mut().zip(v).for_each(|(step, v)| *step = STEP * v);
         integrate(model, q, step, moved);
         moving.clear();
-        for geometry in 0..pairs.geometry_count() {
-            let (placement, v) = (pairs.geometry(geometry).placement, pairs.velocity(geometry));
-            if v == Motion::zero() {
-                continue;
-            }
-            moving.push((geometry, placement));
+        let placement = |geometry| (geometry, pairs.geometry(geometry).placement);
+        moving.extend((0..pairs.geometry_count()).filter(|&g| pairs.velocity(g) != Motion::zero()).map(placement));
+        for &(geometry, placement) in &*moving {
+            let v = pairs.velocity(geometry);
             let turn = lie::exp3(v.angular.scale(STEP)).to_rotation();
             let translation = placement.translation + v.linear.scale(STEP);
             pairs.place(geometry, Se3::new(turn * placement.rotation, translation));

@@ -111,7 +111,9 @@ impl DistancePairs {
     ///
     /// # Errors
     /// Returns [`Error::Geometry`], with the index of the pair and the field, for an unknown frame and for numbers that
-    /// are not finite or have the wrong sign. Other causes are a pair without a frame and a pair of two half-spaces.
+    /// are not finite or have the wrong sign. Other causes are a pair without a frame, a geometry with itself, two
+    /// geometries of one moving body, two half-spaces, a pair that is listed twice, and two different geometries of one
+    /// name.
     pub fn new(model: &Model, pairs: &[GeometryPair]) -> Result<Self, Error> {
         let mut all = Self {
             geometries: Vec::new(),
@@ -129,8 +131,8 @@ impl DistancePairs {
         };
         let is_dense = model.columns().iter().enumerate().all(|(k, c)| c.coordinate == k && c.ratio == 1.0);
         let mut rows = Vec::new();
-        for (pair, both) in pairs.iter().enumerate() {
-            let [first, second] = both.resolve(model, pair)?;
+        let placed = GeometryPair::resolve_all(model, pairs)?;
+        for (pair, (both, [first, second])) in pairs.iter().zip(placed).enumerate() {
             let exact = is_exact(&both.first.shape, &both.second.shape);
             let mut geometries = [0; 2];
             for (side, (geometry, body, pose)) in
@@ -282,7 +284,17 @@ impl DistancePairs {
         let Se3 { rotation, translation } = placement;
         let finite = rotation.is_rotation() && translation.to_array().iter().all(|x| x.is_finite());
         assert!(finite, "placement: expected a rotation and a finite translation, found {placement:?}");
-        self.geometries[geometry].place(placement);
+        self.change(geometry, |placed| placed.place(placement));
+    }
+
+    /// Changes a geometry, and the capsule that replaces it in some of its pairs.
+    fn change(&mut self, geometry: usize, change: impl Fn(&mut Placed)) {
+        for other in 0..self.geometries.len() {
+            if other != geometry && self.geometries[other].geometry == self.geometries[geometry].geometry {
+                change(&mut self.geometries[other]);
+            }
+        }
+        change(&mut self.geometries[geometry]);
     }
 
     /// Sets the velocity of a geometry that is fixed to the world: the linear velocity of the origin of its placement
@@ -309,11 +321,11 @@ impl DistancePairs {
     #[track_caller]
     pub fn set_velocity(&mut self, geometry: usize, velocity: Motion<f64>) {
         check_index("geometry", geometry, self.geometries.len(), "geometries");
-        let placed = &mut self.geometries[geometry];
-        assert!(placed.geometry.frame.is_none(), "geometry {}: expected a geometry in the world", placed.geometry);
+        let Placed { geometry: given, .. } = &self.geometries[geometry];
+        assert!(given.frame.is_none(), "geometry {given}: expected a geometry in the world");
         let is_finite = velocity.to_array().iter().all(|x| x.is_finite());
         assert!(is_finite, "velocity: expected finite numbers, found {velocity:?}");
-        placed.velocity = velocity;
+        self.change(geometry, |placed| placed.velocity = velocity);
     }
 
     /// Returns the velocity of a geometry; 0 unless [`set_velocity`](Self::set_velocity) set it.

@@ -89,8 +89,7 @@ impl PreparedPairs {
     /// Returns the errors of [`DistancePairs::new`](super::DistancePairs::new).
     pub fn new(model: &Model, pairs: &[GeometryPair]) -> Result<Self, Error> {
         let mut all = Self::default();
-        for (index, pair) in pairs.iter().enumerate() {
-            let placed = pair.resolve(model, index)?;
+        for (pair, placed) in pairs.iter().zip(GeometryPair::resolve_all(model, pairs)?) {
             let exact = is_exact(&pair.first.shape, &pair.second.shape);
             let mut shapes = [0; 2];
             for ((geometry, (body, pose)), to) in [&pair.first, &pair.second].into_iter().zip(placed).zip(&mut shapes) {

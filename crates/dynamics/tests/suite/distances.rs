@@ -10,6 +10,7 @@
 
 use crate::common::{all_models, normal3, random_pose, random_rotation, rng};
 use crate::counting::allocations;
+use condyle_dynamics::distances::prepared::PreparedPairs;
 use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
 use condyle_dynamics::{
     Act, Data, Error, Mat3, Model, Motion, Se3, Vec3, forward_kinematics, integrate, lie, neutral, robots,
@@ -252,18 +253,21 @@ fn special_points_of_curved_shapes() {
     check(can, [0.4, 0.0, 0.7], 0.5);
 }
 
-/// Returns pairs of all kinds on random frames of a robot; every third pair has an obstacle in the world.
+/// Returns pairs of all kinds on random bodies of a robot; every third pair has an obstacle in the world.
 fn pairs_on(model: &Model, random: &mut StdRng) -> Vec<GeometryPair> {
     let kinds: Vec<_> = exact_kinds().chain([[3, 3], [4, 2], [1, 3]]).collect();
-    let pair = |(k, kinds): (usize, &[usize; 2])| {
+    let pair = |(k, kinds): (usize, &[usize; 2])| loop {
         let [a, b] = kinds.map(|kind| {
             let frame = &model.frames()[random.random_range(0..model.frames().len())];
             Geometry::on(frame, random_shape(kind, random)).at(random_pose(random))
         });
-        match k % 3 {
+        let pair = match k % 3 {
             0 => GeometryPair::new(a, Geometry { frame: None, ..b }),
             1 => GeometryPair::new(Geometry { frame: None, ..a }, b),
             _ => GeometryPair::new(a, b),
+        };
+        if pair.resolve(model, k).is_ok() {
+            break pair; // two geometries of one body are refused
         }
     };
     kinds.iter().enumerate().map(pair).collect()
@@ -447,4 +451,106 @@ fn wrong_geometries_are_refused() {
     assert_eq!(text, "pairs[0].first (sphere on `tool`): placement.rotation is not a rotation matrix");
     let text = said(Geometry::on("tol", Shape::sphere([0.0; 3], 0.1)), good());
     assert!(text.starts_with("pairs[0].first (sphere on `tol`): frame: unknown frame `tol`"), "{text}");
+    let huge = said(good(), world(Shape::sphere([0.0; 3], 1e200)));
+    assert_eq!(huge, "pairs[0].second (sphere in the world): radius holds 1e200, expected at most 1e30");
+}
+
+/// Checks lists whose pairs are valid one by one, and pairs whose distance has no meaning.
+#[test]
+fn ambiguous_pairs_are_refused() {
+    let arm = robots::arm7();
+    let said = |list: &[GeometryPair]| {
+        let text = DistancePairs::new(&arm, list).unwrap_err().to_string();
+        assert_eq!(PreparedPairs::new(&arm, list).unwrap_err().to_string(), text);
+        text
+    };
+    let ball = |radius| Shape::sphere([0.5, 0.0, 0.4], radius);
+    let (tool, elbow) = (Geometry::on("tool", ball(0.05)).named("tip"), Geometry::on("link4", ball(0.1)));
+    let crate_ = Geometry::in_world(ball(0.1)).named("crate");
+    let pair = |a: &Geometry, b: &Geometry| GeometryPair::new(a.clone(), b.clone());
+    let shift = Se3::new(Mat3::identity(), Vec3::new(0.0, 0.1, 0.0));
+    for (other, field) in [
+        (Geometry { shape: Shape::cuboid([0.1; 3]), ..crate_.clone() }, "shape"),
+        (Geometry { shape: ball(0.2), ..crate_.clone() }, "shape"),
+        (Geometry { frame: Some("link1".into()), ..crate_.clone() }, "frame"),
+        (crate_.clone().at(shift), "placement"),
+    ] {
+        let text = said(&[pair(&tool, &crate_), pair(&elbow, &other)]);
+        assert_eq!(text, format!("pairs[1].second (`crate`): has the name of pairs[0].second, but another {field}"));
+    }
+    let text = said(&[pair(&crate_, &tool), pair(&elbow, &Geometry { name: "tip".to_owned(), ..crate_.clone() })]);
+    assert_eq!(text, "pairs[1].second (`tip`): has the name of pairs[0].second, but another shape");
+    let text = said(&[pair(&tool, &crate_), pair(&elbow, &crate_), pair(&crate_, &tool)]);
+    assert_eq!(text, "pairs[2] (`crate` and `tip`): is the same pair as pairs[0]");
+    assert_eq!(
+        said(&[pair(&tool, &tool)]),
+        "pairs[0] (`tip` and `tip`): is a geometry with itself: expected two \
+        different geometries"
+    );
+    let text = said(&[pair(&tool, &Geometry { name: "other".to_owned(), ..tool.clone() }.at(shift))]);
+    let body = &arm.bodies()[tool.resolve(&arm).unwrap().0].name;
+    let expected = format!("has two geometries of the body `{body}`, whose distance never changes");
+    assert_eq!(text, format!("pairs[0] (`tip` and `other`): {expected}"));
+    // equal geometries without a name, and one name in several pairs, are valid
+    let unnamed = Geometry { name: String::new(), ..crate_.clone() };
+    let list = [pair(&tool, &crate_), pair(&tool, &unnamed), pair(&elbow, &crate_), pair(&elbow, &unnamed)];
+    assert_eq!(DistancePairs::new(&arm, &list).unwrap().geometry_count(), 4);
+}
+
+/// Checks that the smallest and the largest shapes have finite distances and gradients.
+#[test]
+fn extreme_sizes_have_finite_results() {
+    let (arm, up) = (robots::arm7(), Vec3::new(0.0, 0.0, 1.0));
+    let mut data = Data::new(&arm);
+    for size in [0.0_f64, 1e-300, 1e-30, 1.0, 1e30] {
+        let egg = Vec3::new(1.0, 2.0, 3.0).scale(size.clamp(1e-30, 1e29));
+        let shapes = [
+            Shape::sphere([0.0, 0.0, 0.1 * size], size),
+            Shape::capsule([0.0; 3], [0.0, 0.5 * size, size], size),
+            Shape::cuboid([size, 0.5 * size, 0.0]),
+            Shape::Cylinder { radius: size, half_length: 0.5 * size },
+            Shape::Ellipsoid { radii: egg },
+            Shape::HalfSpace { normal: up, offset: -size },
+        ];
+        let ours =
+            [Shape::sphere([0.0; 3], size), Shape::capsule([0.0; 3], [0.0, 0.0, 0.1], 0.0), shapes[2], shapes[4]];
+        let each = ours.iter().flat_map(|&on| shapes.iter().map(move |&other| (on, other)));
+        let list: Vec<_> =
+            each.map(|(on, other)| GeometryPair::new(Geometry::on("tool", on), Geometry::in_world(other))).collect();
+        let pairs = DistancePairs::new(&arm, &list).unwrap();
+        let mut found = Distances::new(&pairs);
+        pairs.gradients(forward_kinematics(&arm, &mut data, &[0.3; 7]), &mut found);
+        for (k, pair) in list.iter().enumerate() {
+            let numbers = [found.distance(k), length(found.normal(k))];
+            let is_finite = numbers.iter().chain(found.gradient(k)).all(|x| x.is_finite());
+            assert!(is_finite && (numbers[1] - 1.0).abs() < 1e-9, "{pair} of size {size}: {numbers:?}");
+        }
+    }
+}
+
+/// Checks that a cylinder moves in all pairs, also where a capsule replaces it.
+#[test]
+fn a_replaced_obstacle_moves_in_all_pairs() {
+    let (arm, q) = (robots::arm7(), [0.3; 7]);
+    let mut data = Data::new(&arm);
+    let placements = forward_kinematics(&arm, &mut data, &q);
+    let tool = placements.frame(arm.frame("tool").unwrap()).translation;
+    let at = |height: f64| Se3::new(Mat3::identity(), tool + Vec3::new(0.0, 0.0, height));
+    let parts = [Shape::sphere([0.0; 3], 0.05), Shape::capsule([0.0; 3], [0.0, 1e-3, 0.0], 0.05)];
+    let can = Geometry::in_world(Shape::Cylinder { radius: 0.1, half_length: 0.2 }).named("can");
+    let list = parts.map(|part| GeometryPair::new(Geometry::on("tool", part), can.clone()));
+    let mut pairs = DistancePairs::new(&arm, &list).unwrap();
+    let (index, mut found) = (pairs.find("can").unwrap(), Distances::new(&pairs));
+    let velocity = Motion::new(Vec3::new(0.0, 0.0, 0.5), Vec3::zero());
+    pairs.set_velocity(index, velocity);
+    for height in [1.0, 2.0] {
+        pairs.place(index, at(height));
+        pairs.values(placements, &mut found);
+        // the flat end of the cylinder, and the round end of the capsule
+        assert!((found.distance(0) - (height - 0.2 - 0.05)).abs() < ROUNDING, "{}", found.distance(0));
+        assert!((found.distance(1) - (height - 0.3 - 0.05)).abs() < 1e-3, "{}", found.distance(1));
+        for pair in 0..2 {
+            assert!((pairs.rate(&found, pair) - 0.5).abs() < 1e-5, "{}", pairs.rate(&found, pair));
+        }
+    }
 }

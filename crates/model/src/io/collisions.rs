@@ -50,8 +50,8 @@ pub struct CollisionMesh {
 /// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Collisions {
-    /// Shapes in the order of the file. A shape without a name is named `link_k`, where k counts the shapes of its
-    /// link.
+    /// Shapes in the order of the file, with different names. A shape without a name, or with the name of an earlier
+    /// shape, is named `link_k`, where k counts the shapes of its link.
     pub geometries: Vec<Geometry>,
     /// Meshes with their warnings, in the order of the file.
     meshes: Vec<(CollisionMesh, Warning)>,
@@ -74,13 +74,19 @@ pub(crate) enum Found {
 }
 
 impl Collisions {
-    /// Adds a shape of a link. A shape with invalid numbers is left out with a warning, and so is a mesh.
+    /// Adds a shape of a link. A shape with invalid numbers is left out with a warning, and so is a mesh. Returns the
+    /// name of the shape, which no earlier shape has.
     pub(crate) fn add(&mut self, element: &Element, link: &str, placement: Se3<f64>, found: Found) -> String {
         let of = |frame: &Option<FrameName>| frame.as_ref().is_some_and(|frame| frame.name == link);
         let count = self.geometries.iter().filter(|geometry| of(&geometry.frame)).count();
         let meshes = self.meshes.iter().filter(|(mesh, _)| mesh.frame.name == link).count();
         let own = element.attribute("name").filter(|name| !name.is_empty()).map(str::to_owned);
-        let name = own.unwrap_or_else(|| format!("{link}_{}", count + meshes));
+        let numbered = (count + meshes..).map(|k| format!("{link}_{k}"));
+        let is_new = |name: &String| {
+            let mut all = self.geometries.iter().map(|geometry| &geometry.name);
+            !all.any(|other| other == name) && !self.meshes.iter().any(|(mesh, _)| mesh.name == *name)
+        };
+        let name = own.into_iter().chain(numbered).find(is_new).unwrap_or_default();
         let frame = FrameName { name: link.to_owned(), kind: Some(FrameKind::Link) };
         match found {
             Found::Shape(shape) => match shape.check() {

@@ -28,7 +28,14 @@ fn pairs(model: &Model, count: usize, rng: &mut StdRng) -> Vec<GeometryPair> {
         let frame = &model.frames()[rng.random_range(0..model.frames().len())];
         if in_world { Geometry::in_world(shape) } else { Geometry::on(frame, shape) }
     };
-    (0..count).map(|k| GeometryPair::new(geometry(k % 3 == 1), geometry(k % 3 == 0))).collect()
+    let mut pair = |k: usize| GeometryPair::new(geometry(k % 3 == 1), geometry(k % 3 == 0));
+    // two geometries of one body are refused
+    (0..)
+        .map(|k| (k, pair(k)))
+        .filter(|(k, pair)| pair.resolve(model, *k).is_ok())
+        .map(|(_, pair)| pair)
+        .take(count)
+        .collect()
 }
 
 /// Frame of a sphere (`None` for the world), centre and radius.
@@ -395,8 +402,9 @@ fn a_violated_distance_is_named() {
 fn a_wrong_geometry_is_refused_by_its_field() {
     let arm = Arc::new(robots::arm7());
     let good = || Geometry::on("tool", Shape::sphere([0.0, 0.0, 0.1], 0.05));
+    let world = |center: [f64; 3], radius| Geometry::in_world(Shape::sphere(center, radius));
     let said = |first: Geometry, second: Geometry| {
-        let pairs = vec![GeometryPair::new(good(), good()), GeometryPair::new(first, second)];
+        let pairs = vec![GeometryPair::new(good(), world([2.0; 3], 0.1)), GeometryPair::new(first, second)];
         let costs = vec![cost("apart", Residual::distances(pairs.clone()), Activation::Quadratic)];
         let error = FreeDynamics::terminal(arm.clone(), costs).map(|_| ()).unwrap_err().to_string();
         let limit = Limit::new("apart", Residual::distances(pairs), vec![0.0; 2], vec![1.0; 2]);
@@ -405,7 +413,6 @@ fn a_wrong_geometry_is_refused_by_its_field() {
         assert_eq!(same.replace("limit", "cost"), error);
         error
     };
-    let world = |center: [f64; 3], radius| Geometry::in_world(Shape::sphere(center, radius));
     let text = "cost `apart`: its pairs[1].first (sphere on `tool`): radius is -0.1, expected at least 0";
     assert_eq!(said(Geometry::on("tool", Shape::sphere([0.0; 3], -0.1)), good()), text);
     let text = "cost `apart`: its pairs[1].second (sphere in the world): radius holds a NaN";
@@ -418,6 +425,8 @@ fn a_wrong_geometry_is_refused_by_its_field() {
     let unknown = said(good(), Geometry::on("tol", Shape::sphere([0.0; 3], 0.1)));
     assert!(unknown.starts_with("cost `apart`: its pairs[1].second (sphere on `tol`): frame: "), "{unknown}");
     assert!(unknown.contains("`tol`") && unknown.contains("`tool`"), "{unknown}");
+    let text = "cost `apart`: its pairs[1] (sphere on `tool` and sphere in the world): is the same pair as pairs[0]";
+    assert_eq!(said(good(), world([2.0; 3], 0.1)), text);
     let residual = Residual::distances(vec![GeometryPair::new(good(), world([1.0; 3], 0.1))]);
     let short = Limit::new("short", residual, vec![0.0; 2], vec![1.0; 1]);
     let end = FreeDynamics::terminal(arm, vec![]).unwrap();

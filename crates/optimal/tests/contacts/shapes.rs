@@ -33,11 +33,14 @@ fn geometry(model: &Model, kind: usize, rng: &mut StdRng) -> Geometry {
 /// Returns pairs of all kinds, some with an obstacle in the world.
 fn pairs(model: &Model, rng: &mut StdRng) -> Vec<GeometryPair> {
     let kinds = (0..36).map(|k| [k / 6, k % 6]).filter(|kinds| kinds[0] != 5 || kinds[1] != 5);
-    let pair = |[a, b]: [usize; 2]| {
+    let pair = |[a, b]: [usize; 2]| loop {
         let (first, second) = (geometry(model, a, rng), geometry(model, b, rng));
-        match b {
+        let pair = match b {
             2 | 5 => GeometryPair::new(first, Geometry { frame: None, ..second }),
             _ => GeometryPair::new(first, second),
+        };
+        if pair.resolve(model, 0).is_ok() {
+            break pair; // two geometries of one body are refused
         }
     };
     kinds.map(pair).collect()
