@@ -93,6 +93,52 @@ fn inspect_lists_collision_shapes() {
     assert!(text.contains("1 pair can collide; the nearest at the neutral position: link0_0 and link2_0, 0.3000 m"));
 }
 
+/// Checks that the shapes of an MJCF and an SDF are listed like the shapes of a URDF.
+#[test]
+fn inspect_lists_collision_shapes_of_all_formats() {
+    let folder = folder("shapes-of-formats");
+    let mjcf = "<mujoco><worldbody><geom name='floor' type='plane' size='1 1 1' pos='0 0 -2'/><body name='a'>
+        <joint axis='0 1 0'/><geom name='first' size='0.1'/><body name='b'><joint axis='0 1 0'/>
+        <inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/><body name='c'><joint axis='0 1 0'/>
+        <geom name='last' type='box' size='0.1 0.1 0.1' pos='0.5 0 0'/></body></body></body></worldbody></mujoco>";
+    let link = |name: &str, shapes: &str| format!("<link name='{name}'>{shapes}</link>");
+    let joint = |parent: &str, child: &str| {
+        format!(
+            "<joint name='to_{child}' type='revolute'><parent>{parent}</parent><child>{child}</child>
+            <axis><xyz>0 1 0</xyz></axis></joint>"
+        )
+    };
+    let shape = |name: &str, x: f64, geometry: &str| {
+        format!("<collision name='{name}'><pose>{x} 0 0 0 0 0</pose><geometry>{geometry}</geometry></collision>")
+    };
+    let first = shape("first", 0.0, "<sphere><radius>0.1</radius></sphere>");
+    let last = shape("last", 0.5, "<box><size>0.2 0.2 0.2</size></box>")
+        + &shape("shell", 0.0, "<mesh><uri>a.stl</uri></mesh>");
+    let links = [link("a", &first), link("b", ""), link("c", &last)].concat();
+    let joints = [joint("world", "a"), joint("a", "b"), joint("b", "c")].concat();
+    let sdf = format!("<sdf version='1.9'><model name='m'>{links}{joints}</model></sdf>");
+    let names = |shapes: &Value| {
+        let all = shapes["shapes"].as_array().unwrap().iter();
+        all.map(|s| ["name", "link", "kind"].map(|key| s[key].as_str().unwrap().to_owned()).join(" "))
+            .collect::<Vec<_>>()
+    };
+    for (file, text, floor) in [("robot.xml", mjcf, true), ("robot.sdf", &*sdf, false)] {
+        let path = folder.join(file);
+        std::fs::write(&path, text).unwrap();
+        let report = json(&["inspect", path.to_str().unwrap(), "--json"], 0);
+        let shapes = &report["collisions"];
+        let expected = ["floor world half-space", "first a sphere", "last c box"];
+        assert_eq!(names(shapes), expected[usize::from(!floor)..], "{file}");
+        // the floor can touch both shapes
+        assert_eq!(shapes["pairs"].as_u64(), Some(if floor { 3 } else { 1 }), "{file}");
+        let nearest = &shapes["nearest"];
+        assert_eq!([&nearest["first"], &nearest["second"]], ["first", "last"], "{file}");
+        assert!((nearest["distance"].as_f64().unwrap() - 0.3).abs() < 1e-12, "{file}: {shapes}");
+        let left_out = shapes["left_out"].as_array().unwrap();
+        assert_eq!(left_out.len(), usize::from(!floor), "{file}: {left_out:?}");
+    }
+}
+
 #[test]
 fn inspect_warns_with_line_numbers() {
     let folder = folder("odd");
