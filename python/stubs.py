@@ -297,7 +297,7 @@ RESULTS = {
         getAcceleration getClassicalAcceleration getFrameAcceleration getFrameClassicalAcceleration getFrameVelocity
         getVelocity""",
     "Force": "computeCentroidalMomentum _SpelledData.hg",
-    "list[_Array]": "_DistancePairs._evaluate _SpelledData.com",
+    "list[_Array]": "_rnea_pull _DistancePairs._evaluate _SpelledData.com",
     "tuple[_Array, _Array, _Array]": "_SpelledData._state _DifferentialIk._hold",
     "_Array | None": "Joint.axis FrictionContact.corners",
     "_Array | list[_Array]": "Problem.quasi_static",

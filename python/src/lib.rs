@@ -47,6 +47,7 @@ mod made_for;
 mod model;
 mod mpc;
 mod optimal;
+mod pulled;
 mod regressors;
 mod robots;
 mod signals;
@@ -134,6 +135,8 @@ mod _condyle {
         InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivity, Sweep, Unicycle,
         WrenchCone, rollout_many, solve_variations,
     };
+    #[pymodule_export]
+    use pulled::rnea_pull;
     #[pymodule_export]
     use regressors::{
         joint_torque_regressor, kinetic_energy_regressor, passive_torque, passive_torque_derivatives,

@@ -3,7 +3,7 @@
 use super::evaluation::{by_knot, named_controls};
 use super::problem::{Problem, lock};
 use super::solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
-use crate::arrays::{Give, class, matrix, output};
+use crate::arrays::{Give, class, matrix, output, vector};
 use crate::exceptions::{problem_error, within, wrong_word};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyTypeError;
@@ -68,13 +68,7 @@ impl Sensitivity {
     #[new]
     #[pyo3(signature = (solver, *, curvature="exact", tolerance=1e-3, strictness=1e-4))]
     fn new(solver: &Bound<'_, PyAny>, curvature: &str, tolerance: f64, strictness: f64) -> PyResult<Self> {
-        let curvature = match curvature {
-            "exact" => Curvature::Exact,
-            "dynamics" => Curvature::Dynamics,
-            "gauss_newton" => Curvature::GaussNewton,
-            other => return Err(wrong_word("curvature", "'exact', 'dynamics' or 'gauss_newton'", other)),
-        };
-        let settings = SensitivitySettings { curvature, tolerance, strictness };
+        let settings = SensitivitySettings { curvature: curvature_of(curvature)?, tolerance, strictness };
         let py = solver.py();
         if let Ok(solver) = solver.cast::<Fddp>() {
             let (solver, problem) = (lock("solver", &solver.get().solver)?, &solver.get().problem);
@@ -91,6 +85,37 @@ impl Sensitivity {
                 solver.get_type().name()?
             )))
         }
+    }
+
+    /// Computes the derivatives at a solution of `Fddp` with the given states, controls and gains, which may come from
+    /// `solve_many`. The problem must be the solved problem.
+    #[staticmethod]
+    fn _at(
+        problem: &Bound<'_, Problem>,
+        xs: &Bound<'_, PyAny>,
+        us: &Bound<'_, PyAny>,
+        K: &Bound<'_, PyAny>,
+        curvature: &str,
+    ) -> PyResult<Self> {
+        let settings = SensitivitySettings { curvature: curvature_of(curvature)?, ..Default::default() };
+        let solution = {
+            let inner = lock("problem", &problem.get().inner)?;
+            let mut solution = rust::Fddp::new(&inner).solution().clone();
+            solution.xs = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
+            solution.us = named_controls("us", &inner, us)?;
+            let size = solution.K.iter().map(|K| K.len()).sum();
+            let numbers = vector("K", K, size)?;
+            let mut rest = &numbers[..];
+            for gains in &mut solution.K {
+                let (nu, ndx) = gains.shape();
+                let (own, others) = rest.split_at(nu * ndx);
+                *gains = nalgebra::DMatrix::from_row_slice(nu, ndx, own);
+                rest = others;
+            }
+            solution.status = rust::Status::Converged;
+            solution
+        };
+        Self::of(problem.py(), problem.as_unbound(), &solution, None, settings)
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -262,6 +287,16 @@ impl Sensitivity {
     }
 }
 
+/// Returns the curvature with this name.
+fn curvature_of(name: &str) -> PyResult<Curvature> {
+    match name {
+        "exact" => Ok(Curvature::Exact),
+        "dynamics" => Ok(Curvature::Dynamics),
+        "gauss_newton" => Ok(Curvature::GaussNewton),
+        other => Err(wrong_word("curvature", "'exact', 'dynamics' or 'gauss_newton'", other)),
+    }
+}
+
 impl Sensitivity {
     /// Linearises the optimality conditions at a solution. Other Python threads can run meanwhile.
     fn of(
@@ -304,6 +339,11 @@ impl Sensitivity {
             Some(by_us) => named_controls("by_us", &problem, by_us)?,
             None => vec![0.0; problem.control_range(rows - 1).start],
         };
+        for (name, numbers) in [("by_xs", &by_states), ("by_us", &by_controls)] {
+            if let Some(index) = numbers.iter().position(|x| !x.is_finite()) {
+                return Err(problem_error(rust::Error::NotFinite { name, index, value: numbers[index] }));
+            }
+        }
         Ok([by_states, by_controls])
     }
 }
