@@ -8,6 +8,8 @@
 mod adjoint;
 mod curvature;
 mod forward;
+mod lanes;
+mod many;
 mod parameters;
 mod point;
 mod report;
@@ -15,6 +17,7 @@ mod system;
 
 pub use adjoint::Adjoint;
 pub use forward::SolutionJacobian;
+pub use many::Sensitivities;
 pub use parameters::{Parameter, ParameterJacobian};
 pub use report::{Curvature, SensitivityReport, SensitivitySettings, WeakestBound};
 
