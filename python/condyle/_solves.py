@@ -367,14 +367,16 @@ class Solves:
     def _gradients(
         self, sensitivity: Any, values: Sequence[_Array], needed: Sequence[bool], by_xs: _Array, by_us: Any
     ) -> Iterator[tuple[int, _Array]]:
-        """Yields the indices of the needed parameters and their gradients in tangent spaces."""
-        for k, (parameter, value) in enumerate(zip(self.parameters, values, strict=True)):
-            if needed[k]:
-                if parameter.own and k not in self._defined:
-                    step = STEP * max(1.0, float(np.abs(value).max(initial=0.0)))
-                    sensitivity.define(parameter.name, value.size, _Changed(self, values, k), step)
-                    self._defined.add(k)
-                yield k, sensitivity.gradient(parameter.name, by_xs, by_us, by_knot=parameter.by_knot)
+        """Yields the indices of the needed parameters and their gradients in tangent spaces, from one adjoint."""
+        indices = [k for k, flag in enumerate(needed) if flag]
+        for k in indices:
+            if self.parameters[k].own and k not in self._defined:
+                step = STEP * max(1.0, float(np.abs(values[k]).max(initial=0.0)))
+                sensitivity.define(self.parameters[k].name, values[k].size, _Changed(self, values, k), step)
+                self._defined.add(k)
+        names = [self.parameters[k].name for k in indices]
+        by_knot = [self.parameters[k].name for k in indices if self.parameters[k].by_knot]
+        yield from zip(indices, sensitivity.gradients(names, by_xs, by_us, by_knot=by_knot), strict=True)
 
 
 class _NoCopyError(Exception):

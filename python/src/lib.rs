@@ -132,8 +132,8 @@ mod _condyle {
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,
         ControlRate, Cost, DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics,
-        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivity, Sweep, Unicycle,
-        WrenchCone, rollout_many, solve_variations,
+        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivities, Sensitivity, Sweep,
+        Unicycle, WrenchCone, rollout_many, solve_variations,
     };
     #[pymodule_export]
     use pulled::rnea_pull;
