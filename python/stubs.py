@@ -99,6 +99,8 @@ ARGUMENTS = {
         _DifferentialIk._step.v0 _DifferentialIk._place.velocity Model.append.placement
         ModelBuilder.append.placement ModelBuilder.merge.placement""",
     "Fddp": "_solve_many.solver",
+    "Sequence[Sensitivity]": "sensitivities",
+    "Sequence[str]": "parameters Sensitivities.gradients.by_knot Sensitivity.gradients.by_knot",
     "tuple[Any, Any]": "_solve_many.start",
     "tuple[Callable[..., object], list[Any]] | None": "_solve_many.vary",
     "Callable[[int], object] | None": "_solve_many.report",
@@ -297,7 +299,8 @@ RESULTS = {
         getAcceleration getClassicalAcceleration getFrameAcceleration getFrameClassicalAcceleration getFrameVelocity
         getVelocity""",
     "Force": "computeCentroidalMomentum _SpelledData.hg",
-    "list[_Array]": "_DistancePairs._evaluate _SpelledData.com",
+    "list[_Array]": """
+        Sensitivities.gradients Sensitivity.gradients _rnea_pull _DistancePairs._evaluate _SpelledData.com""",
     "tuple[_Array, _Array, _Array]": "_SpelledData._state _DifferentialIk._hold",
     "_Array | None": "Joint.axis FrictionContact.corners",
     "_Array | list[_Array]": "Problem.quasi_static",
@@ -314,7 +317,7 @@ RESULTS = {
     "tuple[float, float]": "Plan.span",
     "Data": "_SpelledData._ours",
     "int": """
-        _Collisions._fit _DistancePairs.__len__
+        _Collisions._fit _DistancePairs.__len__ Sensitivities.__len__ Sensitivities.in_lanes
         _SpelledData._given ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame
         Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority
         AugmentedLagrangian.retime Fddp.retime InteriorPoint.retime Record.__len__ Schedule.model""",
@@ -412,6 +415,7 @@ RESULTS = {
     "list[LqKnot]": "Problem.derivatives",
     "ManyRollouts": "rollout_many",
     "SweepResult": "Sweep.run",
+    "Sensitivity": "Sensitivity.prepare",
     "SensitivityReport": "Sensitivity.report",
     "BoundGradients": "Sensitivity.bounds",
     "tuple[_Array, _Array | list[_Array]]": "Sensitivity.jacobian",

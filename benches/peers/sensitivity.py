@@ -8,7 +8,8 @@ use the same CasADi expressions. The loss is a linear function of all states and
 Its gradient is taken with respect to the initial state and to the goal. CasADi solves the problem with IPOPT by
 multiple shooting, and differentiates with `nlpsol(...).reverse(1)`. Condyle solves the problem with `Fddp`.
 
-For an arm of Condyle, the program prints times only.
+For an arm of Condyle, the program prints times only: of one problem, and of the gradients of 256 problems, one by one
+and in lanes (`Sensitivities`).
 
 The program prints the largest relative difference of the gradients, and these times (the least of the rounds): an
 iteration of the solver, the creation of a `Sensitivity`, a gradient with it, and a gradient by CasADi. CasADi's
@@ -27,9 +28,10 @@ import numpy as np
 
 import condyle
 import condyle.casadi
-from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivity
+from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivities, Sensitivity
 
 TOLERANCE = 1e-6
+MANY = 256
 
 
 class Case(NamedTuple):
@@ -188,6 +190,35 @@ def robot(name: str, model: condyle.Model, posture: np.ndarray, rounds: int) -> 
     return {"problem": name, "error": 0.0, "times": times}
 
 
+def many(name: str, model: condyle.Model, posture: np.ndarray, rounds: int) -> dict[str, Any]:
+    """Returns times of the gradients of many problems of a robot, for each problem, and their largest difference."""
+    x0, n, nv = np.r_[posture, np.zeros(model.nv)], 50, model.nv
+    rest = Cost("rest", 1.0, Residual.state(x0))
+    effort, end = Cost("effort", 1e-3, Residual.control(np.zeros(nv))), FreeDynamics(model, None, [rest])
+    names, generator, each = ["x0", "target/rest"], np.random.default_rng(1), []
+    for _ in range(MANY):
+        moved = np.r_[posture + generator.uniform(-0.3, 0.3, nv), np.zeros(nv)]
+        problem = Problem(moved, [FreeDynamics(model, 0.02, [rest, effort])], [0] * n, end)
+        solver, xs = Fddp(problem, max_iterations=200), np.tile(moved, (n + 1, 1))
+        status = solver.solve(xs, problem.quasi_static(xs)).status
+        if status != "converged":
+            raise RuntimeError(f"{name}: a solution has the status {status}")
+        each.append(Sensitivity(solver, curvature="gauss_newton").prepare(names))
+    by_xs, by_us = generator.standard_normal((MANY, n + 1, 2 * nv)), generator.standard_normal((MANY, n, nv))
+    together = Sensitivities(each)
+
+    def one_by_one(names: list[str]) -> list[Any]:
+        return [of.gradients(names, x, u) for of, x, u in zip(each, by_xs, by_us, strict=True)]
+
+    found = zip(together.gradients(names, by_xs, by_us), zip(*one_by_one(names), strict=True), strict=True)
+    error = max(float(np.abs(ours - np.vstack(alone)).max() / np.abs(ours).max()) for ours, alone in found)
+    times = {"create in lanes": least(rounds, lambda: Sensitivities(each)) / MANY}
+    for label, some in (("x0", names[:1]), ("x0 and target", names)):
+        times[f"one by one, {label}"] = least(rounds, lambda some=some: one_by_one(some)) / MANY
+        times[f"in lanes, {label}"] = least(rounds, lambda some=some: together.gradients(some, by_xs, by_us)) / MANY
+    return {"problem": f"{MANY} problems of an {name}", "error": error, "times": times}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=20, help="number of measurements of each time")
@@ -195,7 +226,8 @@ def main() -> None:
     arguments = parser.parse_args()
     results = [compare(case, arguments.rounds) for case in (cartpole(), chain())]
     arm = condyle.robots.arm7()
-    results.append(robot("arm of 7 joints", arm, np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0]), arguments.rounds))
+    posture = np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0])
+    results += [kind("arm of 7 joints", arm, posture, arguments.rounds) for kind in (robot, many)]
     if arguments.json:
         print(json.dumps(results, indent=1))
         return

@@ -110,6 +110,7 @@ __all__ = [
     "Record",
     "Residual",
     "Schedule",
+    "Sensitivities",
     "Sensitivity",
     "Simulation",
     "Sweep",
@@ -4940,6 +4941,66 @@ class Schedule:
         """
 
 @final
+class Sensitivities:
+    """The derivatives of many solutions. Their adjoints are computed several at a time in the lanes of SIMD registers.
+
+    The B problems have the same numbers of knots, states and controls. The results equal those of each `Sensitivity` up
+    to rounding. Different controls may be at their bounds. The adjoint of a solution with active limits is computed
+    alone.
+
+    The derivatives with respect to parameters belong to the solved problems, one `Sensitivity` each. If the solutions
+    are of one `Problem` whose parameters were set in between, call `Sensitivity.prepare` for the parameters before the
+    problem changes.
+
+    sensitivities: the `Sensitivity` of each solution.
+
+    Raises `ProblemError` for an empty list, or if a problem has other dimensions than the first one.
+
+    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivities, Sensitivity
+    >>> arm = condyle.robots.arm7()
+    >>> rest, effort = Cost("rest", 1.0, Residual.state(np.zeros(14))), Cost("effort", 0.1, Residual.control(np.zeros(7)))
+    >>> knot, end = FreeDynamics(arm, 0.05, [rest, effort]), FreeDynamics(arm, None, [rest])
+    >>> problem, each = Problem(np.zeros(14), [knot], [0] * 10, end), []
+    >>> solver = Fddp(problem)
+    >>> for x in (0.1, 0.2, 0.3):
+    ...     problem.set_x0(np.full(14, x))
+    ...     solution = solver.solve(np.full((11, 14), x), np.zeros((10, 7)))
+    ...     each.append(Sensitivity(solver).prepare(["x0", "target/rest"]))
+    >>> many = Sensitivities(each)
+    >>> by_x0, by_target = many.gradients(["x0", "target/rest"], by_us=np.ones((3, 10, 7)))
+    >>> by_target.shape
+    (3, 14)
+    """
+
+    def __new__(cls, sensitivities: Sequence[Sensitivity]) -> Sensitivities: ...
+    @property
+    def in_lanes(self) -> int:
+        """The number of solutions whose adjoints are computed in lanes. The others have active limits."""
+
+    def __len__(self, /) -> int: ...
+    def gradients(
+        self,
+        parameters: Sequence[str],
+        by_xs: ArrayLike | None = None,
+        by_us: _Controls | None = None,
+        by_knot: Sequence[str] = ...,
+    ) -> list[_Array]:
+        """Computes the gradients of losses L(x, u), one for each solution, with respect to several parameters. The
+        adjoints are computed once. Returns a list with an array (B, n) for each parameter.
+
+        parameters: the names of the parameters.
+        by_xs: the gradients of the losses with respect to the states, (B, N + 1, ndx), in the tangent space; None for
+            zeros.
+        by_us: the gradients of the losses with respect to the controls, (B, N, nu), or a list of N arrays (B, nu) if
+            knots differ in nu; None for zeros.
+        by_knot: the names of parameters for which the part of each knot is returned, (B, N + 1, n), as by
+            `Sensitivity.gradient`.
+
+        Raises `ProblemError` as `Sensitivity.gradient` does, and if a parameter has another size than in the first
+        problem.
+        """
+
+@final
 class Sensitivity:
     """The derivatives of a solver's last solution with respect to the parameters of its problem.
 
@@ -5006,13 +5067,14 @@ class Sensitivity:
         """Defines a parameter of your own, whose derivatives are central differences: the inertia of a body, a coefficient
         of friction, or any other number of which problems are built.
 
-        name: the name, for `gradient` and `jacobian`. A parameter of this name is replaced.
+        name: the name, for `gradient` and `jacobian`. An earlier definition of this name is replaced.
         size: the number of entries.
         build: a function that returns the `Problem` for a change of the entries from the solved problem. It is called
-            twice for each entry.
+            with zeros first, and then twice for each entry.
         step: the size of these changes.
 
-        Raises `ProblemError` if a problem has other dimensions, and exceptions of `build`.
+        Raises `ProblemError` if the problem for zeros is another one than the solved problem, or if a problem has other
+        dimensions; `ValueError` for the name of a parameter that exists already; and exceptions of `build`.
         """
 
     def first_control_by_x0(self) -> _Array:
@@ -5036,7 +5098,24 @@ class Sensitivity:
             parameter that only this knot uses, such as the rows of `Problem.references`.
 
         Raises `ProblemError` if the parameter does not exist, or if the problem has changed since this object was
-        created and the derivatives of this parameter are not stored yet. Stored ones belong to the solved problem.
+        created.
+        """
+
+    def gradients(
+        self,
+        parameters: Sequence[str],
+        by_xs: ArrayLike | None = None,
+        by_us: _Controls | None = None,
+        by_knot: Sequence[str] = ...,
+    ) -> list[_Array]:
+        """Computes the gradients of a loss with respect to several parameters, by one solution of the adjoint problem.
+        Returns a list with an array for each parameter.
+
+        parameters: the names of the parameters.
+        by_xs, by_us: as for `gradient`.
+        by_knot: the names of parameters for which the part of each knot is returned, as by `gradient`.
+
+        Raises `ProblemError` as `gradient` does.
         """
 
     def jacobian(self, parameter: str) -> tuple[_Array, _Array | list[_Array]]:
@@ -5047,6 +5126,15 @@ class Sensitivity:
         parameter: the name of the parameter.
 
         Raises `ProblemError` as `gradient` does.
+        """
+
+    def prepare(self, parameters: Sequence[str]) -> Sensitivity:
+        """Computes and stores the derivatives of the optimality conditions with respect to parameters, for later gradients
+        by `Sensitivities`. Returns this object.
+
+        parameters: the names of the parameters.
+
+        Raises `ProblemError` if a parameter does not exist, or if the problem has changed since this object was created.
         """
 
 @final

@@ -29,8 +29,8 @@ def load(name: str, package: str | None = None, root_joint: str | None = None) -
         raise ValueError(f"package: expected None, {' or '.join(map(repr, PACKAGES))}, found {package!r}")
     installed = [one for one in PACKAGES if package in (None, one) and find_spec(one)]
     if not installed:
-        expected = package or " or ".join(PACKAGES)
-        raise ImportError(f"load: the robots' files are those of {expected}, which is not installed (pip install)")
+        expected = " or ".join([package] if package else PACKAGES)
+        raise ImportError(f"load: expected an installed package with files of robots: pip install {expected}")
     for one in installed:
         model = _example(name, root_joint) if one == "example_robot_data" else _described(name, root_joint)
         if model is not None:

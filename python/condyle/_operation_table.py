@@ -38,8 +38,11 @@ def rnea(pool: Pool, forces: bool) -> Operation:
             blocks[3, 0] = -_body_slopes(pool, scratch, q, cotangents[0])
         return blocks
 
-    inputs = [*_motion(pool, 3), *_forces(pool, forces)]
-    return Operation("rnea", pool, inputs, [Slot("tau", (nv,))], value, jacobians, hessian)
+    def slopes(scratch: Scratch, x: list[_Array], r: _Array) -> list[_Array | None]:
+        return [*c._rnea_pull(model, scratch.data, *x, r, 3)]
+
+    inputs, pulled = [*_motion(pool, 3), *_forces(pool, forces)], None if forces else slopes
+    return Operation("rnea", pool, inputs, [Slot("tau", (nv,))], value, jacobians, hessian, slopes=pulled)
 
 
 def aba(pool: Pool, forces: bool) -> Operation:
@@ -75,8 +78,14 @@ def aba(pool: Pool, forces: bool) -> Operation:
             blocks[3, 0] = _body_slopes(pool, scratch, q, mu) + np.matmul(_body_jacobians(pool, scratch, q), found[3])
         return blocks
 
+    def slopes(scratch: Scratch, x: list[_Array], r: _Array, y: _Array | None = None) -> list[_Array | None]:
+        a = function(model, scratch.data, *x) if y is None else y
+        by_q, by_v = c._rnea_pull(model, scratch.data, x[0], x[1], a, r, 2)
+        return [by_q, by_v, np.negative(r, out=r)]
+
     inputs = [*_motion(pool, 2), Slot("tau", (nv,)), *_forces(pool, forces)]
-    return Operation("aba", pool, inputs, [Slot("a", (nv,))], value, jacobians, hessian, solve)
+    pulled = None if forces else slopes
+    return Operation("aba", pool, inputs, [Slot("a", (nv,))], value, jacobians, hessian, solve, pulled)
 
 
 _BLOCKS = ((0, 0), (1, 0), (1, 1), (2, 0))

@@ -11,8 +11,7 @@ them to derivatives with respect to the nq numbers of a position.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,17 +59,16 @@ class Pool:
         self.coordinates = Coordinates(model)
         self._free: list[Scratch] = [Scratch(model, threads)]
 
-    @contextmanager
-    def scratch(self) -> Iterator[Scratch]:
-        """Lends scratch memory to one call."""
+    def take(self) -> Scratch:
+        """Lends scratch memory to one call, which gives it back."""
         try:
-            lent = self._free.pop()
+            return self._free.pop()
         except IndexError:  # other threads use all of it
-            lent = Scratch(self.model, self.threads)
-        try:
-            yield lent
-        finally:
-            self._free.append(lent)
+            return Scratch(self.model, self.threads)
+
+    def give_back(self, scratch: Scratch) -> None:
+        """Takes scratch memory back."""
+        self._free.append(scratch)
 
 
 Value = Callable[..., tuple[_Array, ...]]
@@ -79,6 +77,9 @@ Jacobians = Callable[..., list[list["_Array | float | None"]]]
 """(scratch, needed, *x) -> for each result and each argument ∂y/∂x, (N, m, n), in tangent spaces. A number is this
 multiple of the unit matrix, and a zero Jacobian is None. None may also replace the Jacobian for an argument that is not
 in `needed`."""
+Slopes = Callable[..., list["_Array | None"]]
+"""(scratch, x, r) -> Jᵀ r for each argument, in tangent spaces, without Jacobians in memory; None for zeros. r is one
+vector for each state, (N, m)."""
 Solve = Callable[..., _Array]
 """(scratch, x, r) -> S r, (N, nv), with a symmetric matrix S for each state."""
 Hessian = Callable[..., dict[tuple[int, int], _Array]]
@@ -98,13 +99,14 @@ class Operation:
         jacobians: Jacobians,
         hessian: Hessian | None = None,
         solve: Solve | None = None,
+        slopes: Slopes | None = None,
     ) -> None:
-        """Makes an operation. With `solve`, the Jacobians of the only result are S J instead of J, and `jacobians`
-        takes the result as the argument `y` if it is known.
+        """Makes an operation. With `solve`, the Jacobians of the only result are S J instead of J, and `jacobians` and
+        `slopes` take the result as the argument `y` if it is known. `slopes` may be given for a single result.
         """
         self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
         self._pool, self._value, self._jacobians = pool, value, jacobians
-        self._hessian, self._solve = hessian, solve
+        self._hessian, self._solve, self._transposed = hessian, solve, slopes
         rows = sum(math.prod(slot.shape) for slot in outputs)
         columns = sum(math.prod(slot.shape) for slot in inputs)
         self._chunk = max(16 * pool.threads, CHUNK // (8 * max(rows * columns, 1)))
@@ -116,6 +118,14 @@ class Operation:
     def twice(self) -> bool:
         """Whether exact second derivatives exist."""
         return self._hessian is not None
+
+    @property
+    def reuses(self) -> bool:
+        """Whether `pull` and `push` take less time if they get the results f(x)."""
+        return self._solve is not None
+
+    def _known(self, y: Sequence[NDArray[Any]]) -> Sequence[NDArray[Any]]:
+        return y if self.reuses else ()
 
     def too_often(self) -> NotImplementedError:
         """Returns the error of a third differentiation."""
@@ -153,28 +163,37 @@ class Operation:
             slopes = self._slopes(scratch, unit, self._dropped(scratch, unit, cotangents), needed, known)
             return self._lowered(x, slopes)
 
-        count, known = len(cotangents), y if self._solve is not None else ()
+        count, known = len(cotangents), self._known(y)
         return self._rows(x, [*cotangents, *known], rows, self.inputs)
 
-    def push(self, x: Sequence[NDArray[Any]], tangents: Sequence[NDArray[Any]], needed: Sequence[bool]) -> list[_Array]:
-        """Returns J ẋ for each result; tangents of arguments that are not needed count as zero."""
+    def push(
+        self,
+        x: Sequence[NDArray[Any]],
+        tangents: Sequence[NDArray[Any]],
+        needed: Sequence[bool],
+        y: Sequence[NDArray[Any]] = (),
+    ) -> list[_Array]:
+        """Returns J ẋ for each result; tangents of arguments that are not needed count as zero. y: as for `pull`."""
 
-        def rows(scratch: Scratch, x: list[_Array], unit: list[_Array], tangents: list[_Array]) -> list[_Array]:
-            def products(x: list[_Array], along: list[_Array]) -> list[_Array]:
+        def rows(scratch: Scratch, x: list[_Array], unit: list[_Array], both: list[_Array]) -> list[_Array]:
+            def products(x: list[_Array], along: list[_Array], known: list[_Array]) -> list[_Array]:
+                options = {"y": known[0]} if known else {}
                 sums = [np.zeros((len(x[0]), self._size(slot))) for slot in self.outputs]
-                for total, row in zip(sums, self._jacobians(scratch, needed, *x), strict=True):
+                for total, row in zip(sums, self._jacobians(scratch, needed, *x, **options), strict=True):
                     for J, d, flag in zip(row, along, needed, strict=True):
                         if J is not None and flag:
                             total += _product(J, d)
                 return sums if self._solve is None else [self._solve(scratch, x, sums[0])]
 
-            found = self._in_chunks(products, unit, self._tangents(x, tangents))
+            tangents, known = both[:count], both[count:]
+            found = self._in_chunks(products, unit, self._tangents(x, tangents), known)
             if self._flat_results:
                 return found
             values, lift = self._value(scratch, *unit), self._pool.coordinates.lift
             return [lift(y, d) if slot.position else d for slot, y, d in zip(self.outputs, values, found, strict=True)]
 
-        return self._rows(x, tangents, rows, self.outputs)
+        count, known = len(tangents), self._known(y)
+        return self._rows(x, [*tangents, *known], rows, self.outputs)
 
     def bend(
         self,
@@ -244,8 +263,11 @@ class Operation:
             normalized(a) if slot.position else a.reshape(n, *slot.shape)
             for slot, a in zip(self.inputs, rows, strict=True)
         ]
-        with self._pool.scratch() as scratch:
+        scratch = self._pool.take()
+        try:
             results = compute(scratch, rows, unit, matrices[len(x) :])
+        finally:
+            self._pool.give_back(scratch)
         return [result.reshape((*batch, *slot.shape)) for result, slot in zip(results, slots, strict=True)]
 
     def _in_chunks(self, compute: Callable[..., Sequence[_Array]], *groups: list[_Array]) -> list[_Array]:
@@ -290,6 +312,11 @@ class Operation:
     ) -> list[_Array]:
         """Returns Jᵀ λ in tangent spaces; `known` is the result of an operation with `solve`, or empty."""
 
+        def filled(slopes: Sequence[_Array | None], n: int) -> list[_Array]:
+            return [
+                np.zeros((n, self._size(slot))) if g is None else g for g, slot in zip(slopes, self.inputs, strict=True)
+            ]
+
         def products(x: list[_Array], cotangents: list[_Array], known: list[_Array]) -> list[_Array]:
             options = {"y": known[0]} if known else {}
             sums: list[_Array | None] = [None] * len(self.inputs)
@@ -300,11 +327,12 @@ class Operation:
                     if J is not None and needed[k]:
                         g, before = _transposed_product(J, cotangent), sums[k]
                         sums[k] = g if before is None else before + g
-            return [
-                np.zeros((len(x[0]), self._size(slot))) if g is None else g
-                for g, slot in zip(sums, self.inputs, strict=True)
-            ]
+            return filled(sums, len(x[0]))
 
+        if self._transposed is not None:
+            options = {"y": known[0]} if known else {}
+            r = cotangents[0] if self._solve is None else self._solve(scratch, unit, cotangents[0])
+            return filled(self._transposed(scratch, unit, r, **options), len(unit[0]))
         return self._in_chunks(products, unit, cotangents, list(known))
 
 

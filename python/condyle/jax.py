@@ -10,8 +10,8 @@
 Values are computed by the library's functions for many states, in SIMD lanes and on `threads` threads; derivatives by
 the library's exact derivatives. Second derivatives are exact where they exist: the docstring of a method tells where.
 Elsewhere a second differentiation raises `NotImplementedError`. `jax.jit`, `grad`, `vmap`, `jacrev`, `jacfwd`,
-`hessian` and `lax.scan` work. Compiled programs call the library by `jax.pure_callback`; `vmap` adds an axis to the
-batch of one call.
+`hessian` and `lax.scan` work. Compiled programs call the library by a handler of XLA's foreign function interface, and
+`ProblemLayer` by `jax.pure_callback`; `vmap` adds an axis to the batch of one call.
 
 Arrays have float32 or float64 numbers, and results have the arguments' type. So with JAX's default setting, without
 `jax_enable_x64`, results are float32. All computations use float64 inside. NaN in one state gives NaN in the results of
@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _dynamics, _layer
+from . import _dynamics, _kinds, _layer
 from ._condyle import Model
 from ._operations import Operation, Shape, Slot
 
@@ -50,14 +50,15 @@ _Primitive: Any = importlib.import_module("jax.extend.core").Primitive
 
 __all__ = ["Dynamics", "ProblemLayer"]
 
-Call = Callable[..., Sequence[Any]]
-
 
 def _floats(names: Sequence[str], values: Sequence[Any]) -> list[Any]:
     """Returns the arguments as arrays with one type of floating-point numbers."""
     arrays = []
     for name, value in zip(names, values, strict=True):
-        array = jnp.asarray(value)
+        try:
+            array = jnp.asarray(value)
+        except (TypeError, ValueError) as error:
+            raise TypeError(f"{name}: expected an array or numbers, found {type(value).__name__}: {error}") from None
         if array.dtype not in (jnp.float32, jnp.float64):
             raise TypeError(f"{name}: expected float32 or float64, found {array.dtype}")
         arrays.append(array)
@@ -65,7 +66,7 @@ def _floats(names: Sequence[str], values: Sequence[Any]) -> list[Any]:
     return [array.astype(kind) for array in arrays]
 
 
-def _primitive(name: str, compute: Call, slots: Callable[[Operation], Sequence[Slot]]) -> Any:
+def _primitive(name: str, compute: _kinds.Function, slots: Callable[[Operation], Sequence[Slot]]) -> Any:
     """Makes a primitive with arguments (*arrays, operation, needed): x, then cotangents λ, then tangents ẋ.
 
     compute: (operation, needed, *NumPy arrays) -> results; slots: the results' names and shapes.
@@ -73,28 +74,27 @@ def _primitive(name: str, compute: Call, slots: Callable[[Operation], Sequence[S
     primitive = _Primitive(f"condyle_{name}")
     primitive.multiple_results = True
 
-    def shapes(arrays: Sequence[Any], operation: Operation) -> list[Any]:
-        cut = len(arrays[0].shape) - len(operation.inputs[0].shape)
-        batch, kind = tuple(arrays[0].shape[:cut]), arrays[0].dtype
-        return [jax.ShapeDtypeStruct((*batch, *slot.shape), kind) for slot in slots(operation)]
-
     def call(operation: Operation, needed: Any, *arrays: Any) -> list[Any]:
         numbers = [np.asarray(array) for array in arrays]
         results = compute(operation, needed, *numbers)
         with np.errstate(over="ignore"):  # too large for float32: infinity
-            return [y.astype(numbers[0].dtype) for y in results]
+            return [y.astype(numbers[0].dtype, copy=False) for y in results]
 
-    def compiled(*arrays: Any, operation: Operation, needed: Any) -> Any:
+    def lowered(context: Any, *arrays: Any, operation: Operation, needed: Any) -> Any:
         def host(*arrays: Any) -> list[Any]:
             return call(operation, needed, *arrays)
 
-        return jax.pure_callback(host, shapes(arrays, operation), *arrays, vmap_method="broadcast_all")
+        return _mlir.emit_python_callback(
+            context, host, None, arrays, context.avals_in, context.avals_out, has_side_effect=False
+        )[0]
 
     def at_once(*arrays: Any, operation: Operation, needed: Any) -> list[Any]:
         return [jnp.asarray(y) for y in call(operation, needed, *arrays)]
 
     def abstract(*arrays: Any, operation: Operation, needed: Any) -> list[Any]:
-        return [jax.core.ShapedArray(s.shape, s.dtype) for s in shapes(arrays, operation)]
+        cut = len(arrays[0].shape) - len(operation.inputs[0].shape)
+        batch, kind = tuple(arrays[0].shape[:cut]), arrays[0].dtype
+        return [jax.core.ShapedArray((*batch, *slot.shape), kind) for slot in slots(operation)]
 
     def batched(arrays: Sequence[Any], axes: Sequence[Any], operation: Operation, needed: Any) -> Any:
         (size,) = {a.shape[at] for a, at in zip(arrays, axes, strict=True) if at is not None}
@@ -107,48 +107,29 @@ def _primitive(name: str, compute: Call, slots: Callable[[Operation], Sequence[S
 
     primitive.def_impl(at_once)
     primitive.def_abstract_eval(abstract)
-    _mlir.register_lowering(primitive, _mlir.lower_fun(compiled, multiple_results=True))
+    _mlir.register_lowering(primitive, lowered)
     _batching.primitive_batchers[primitive] = batched
     return primitive
 
 
-def _inputs(operation: Operation) -> Sequence[Slot]:
-    return operation.inputs
+_value = _primitive("value", _kinds.value, _kinds.outputs)  # x -> f(x)
+_pull = _primitive("pull", _kinds.pull, _kinds.inputs)  # (x, λ, f(x)) -> Jᵀ λ
+_push = _primitive("push", _kinds.push, _kinds.outputs)  # (x, ẋ, f(x)) -> J ẋ
+_bend = _primitive("bend", _kinds.bend, _kinds.inputs)  # (x, λ, ẋ) -> H ẋ
+_curve = _primitive("curve", _kinds.curve, _kinds.outputs)  # (x, ẋ, ẏ) -> the second derivative along ẋ and ẏ
 
 
-def _outputs(operation: Operation) -> Sequence[Slot]:
-    return operation.outputs
+def _bound(primitive: Any) -> _kinds.Function:
+    return lambda operation, needed, *arrays: primitive.bind(*arrays, operation=operation, needed=needed)
 
 
-def _cut(operation: Operation, arrays: Sequence[Any]) -> tuple[Sequence[Any], Sequence[Any]]:
-    n = len(operation.inputs)
-    return arrays[:n], arrays[n:]
+def _bend_needed(operation: Operation, needed: Sequence[bool], *arrays: Any) -> list[Any]:
+    """Computes H ẋ with zeros for arguments that are not needed, so that the transpose is the same function."""
+    bent = _bend.bind(*arrays, operation=operation, needed=(True,) * len(needed))
+    return [b if flag else jnp.zeros_like(b) for b, flag in zip(bent, needed, strict=True)]
 
 
-def _call_pull(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
-    return operation.pull(*_cut(operation, arrays), needed)
-
-
-def _call_push(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
-    return operation.push(*_cut(operation, arrays), needed)
-
-
-def _call_bend(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
-    x, more = _cut(operation, arrays)
-    m = len(operation.outputs)
-    return operation.bend(x, more[:m], more[m:], needed)
-
-
-def _call_curve(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
-    x, more = _cut(operation, arrays)
-    return operation.curve(x, *_cut(operation, more))
-
-
-_value = _primitive("value", lambda operation, needed, *x: operation.value(*x), _outputs)  # x -> f(x)
-_pull = _primitive("pull", _call_pull, _inputs)  # (x, λ) -> Jᵀ λ
-_push = _primitive("push", _call_push, _outputs)  # (x, ẋ) -> J ẋ
-_bend = _primitive("bend", _call_bend, _inputs)  # (x, λ, ẋ) -> H ẋ
-_curve = _primitive("curve", _call_curve, _outputs)  # (x, ẋ, ẏ) -> the second derivative along ẋ and ẏ
+_FUNCTIONS = _kinds.Functions(_bound(_pull), _bound(_push), _bend_needed, _bound(_curve))
 
 
 def _moving(tangents: Sequence[Any]) -> tuple[bool, ...]:
@@ -160,55 +141,47 @@ def _full(values: Sequence[Any]) -> list[Any]:
     return [_ad.instantiate_zeros(value) for value in values]
 
 
-def _sum(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    return [x + y for x, y in zip(a, b, strict=True)]
+def _given(tangents: Sequence[Any]) -> list[Any] | None:
+    """Returns the tangents without symbols; None if all are zero."""
+    return _full(tangents) if any(_moving(tangents)) else None
 
 
 def _value_jvp(x: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
     y = _value.bind(*x, operation=operation, needed=needed)
-    return y, _push.bind(*x, *_full(tangents), operation=operation, needed=_moving(tangents))
+    known = y if operation.reuses else []
+    return y, _push.bind(*x, *_full(tangents), *known, operation=operation, needed=_moving(tangents))
 
 
 def _push_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
-    x, along = _cut(operation, arrays)
-    moved, changed = _cut(operation, tangents)
-    y = _push.bind(*x, *along, operation=operation, needed=needed)
-    total = [jnp.zeros_like(d) for d in y]
-    if any(_moving(changed)):
-        total = _sum(total, _push.bind(*x, *_full(changed), operation=operation, needed=needed))
-    if any(_moving(moved)):
-        if not operation.twice:
-            raise operation.only_once()
-        total = _sum(total, _curve.bind(*x, *along, *_full(moved), operation=operation, needed=None))
-    return y, total
+    y = _push.bind(*arrays, operation=operation, needed=needed)
+    moved, changed, _ = _kinds.cut_push(operation, tangents)
+    total = _kinds.push_along(_FUNCTIONS, operation, needed, arrays, _given(moved), _given(changed))
+    return y, [jnp.zeros_like(d) for d in y] if total is None else total
 
 
 def _push_transpose(cotangents: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
-    x, along = _cut(operation, arrays)  # along: symbols of the arguments in which J ẋ is linear, or constants
+    x, along, known = _kinds.cut_push(operation, arrays)  # along: symbols where J ẋ is linear, or constants
     linear = tuple(_ad.is_undefined_primal(d) for d in along)
-    slopes = _pull.bind(*x, *_full(cotangents), operation=operation, needed=linear)
-    return [None] * len(x) + [g if flag else None for g, flag in zip(slopes, linear, strict=True)]
+    slopes = _pull.bind(*x, *_full(cotangents), *known, operation=operation, needed=linear)
+    return [
+        *[None] * len(x),
+        *[g if flag else None for g, flag in zip(slopes, linear, strict=True)],
+        *[None] * len(known),
+    ]
 
 
 def _pull_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
-    x, cotangents = _cut(operation, arrays)
-    moved, changed = _cut(operation, tangents)
-    y = _pull.bind(*x, *cotangents, operation=operation, needed=needed)
-    total = [jnp.zeros_like(g) for g in y]
-    if any(_moving(changed)):
-        total = _sum(total, _pull.bind(*x, *_full(changed), operation=operation, needed=needed))
-    if any(_moving(moved)):
-        if not operation.twice:
-            raise operation.only_once()
-        bent = _bend.bind(*x, *cotangents, *_full(moved), operation=operation, needed=(True,) * len(x))
-        total = [t + b if flag else t for t, b, flag in zip(total, bent, needed, strict=True)]
-    return y, total
+    y = _pull.bind(*arrays, operation=operation, needed=needed)
+    moved, changed, _ = _kinds.cut_pull(operation, tangents)
+    total = _kinds.pull_along(_FUNCTIONS, operation, needed, arrays, _given(moved), _given(changed))
+    return y, [jnp.zeros_like(g) for g in y] if total is None else total
 
 
 def _pull_transpose(directions: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
-    x, _ = _cut(operation, arrays)
+    x, _, known = _kinds.cut_pull(operation, arrays)
     along = tuple(a and b for a, b in zip(_moving(directions), needed, strict=True))
-    return [None] * len(x) + list(_push.bind(*x, *_full(directions), operation=operation, needed=along))
+    pushed = _push.bind(*x, *_full(directions), *known, operation=operation, needed=along)
+    return [*[None] * len(x), *pushed, *[None] * len(known)]
 
 
 def _bend_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
@@ -227,19 +200,18 @@ def _bend_transpose(directions: Sequence[Any], *arrays: Any, operation: Operatio
 
 
 def _curve_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
-    x, both = _cut(operation, arrays)
-    moved, more = _cut(operation, tangents)
+    x, a, b = _kinds.cut_push(operation, arrays)
+    moved, along_a, along_b = _kinds.cut_push(operation, tangents)
     if any(_moving(moved)):
         raise operation.too_often()
-    (a, b), (along_a, along_b) = _cut(operation, both), _cut(operation, more)
     y = _curve.bind(*arrays, operation=operation, needed=needed)
     first = _curve.bind(*x, *_full(along_a), *b, operation=operation, needed=needed)
-    return y, _sum(first, _curve.bind(*x, *a, *_full(along_b), operation=operation, needed=needed))
+    second = _curve.bind(*x, *a, *_full(along_b), operation=operation, needed=needed)
+    return y, [i + j for i, j in zip(first, second, strict=True)]
 
 
 def _curve_transpose(cotangents: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
-    x, both = _cut(operation, arrays)
-    a, b = _cut(operation, both)  # linear in one of the two
+    x, a, b = _kinds.cut_push(operation, arrays)  # linear in one of the two
     first = any(_ad.is_undefined_primal(d) for d in a)
     bent = _bend.bind(*x, *_full(cotangents), *(b if first else a), operation=operation, needed=(True,) * len(x))
     none = [None] * len(x)
@@ -303,15 +275,22 @@ class Dynamics(_dynamics.Dynamics):
         return jnp.concatenate(parts, -1)
 
 
+def _on_host(host: Callable[..., Any], shapes: Sequence[Any], arrays: Sequence[Any]) -> tuple[Any, ...]:
+    """Calls a function of NumPy arrays: at once if all arrays are known, so that its exceptions reach the caller."""
+    if any(isinstance(array, jax.core.Tracer) for array in arrays):
+        return tuple(jax.pure_callback(host, shapes, *arrays, vmap_method="broadcast_all"))
+    return tuple(jnp.asarray(y) for y in host(*arrays))
+
+
 def _solution(layer: "ProblemLayer", keys: Any, *p: Any) -> Any:
     """Returns the solution (x(p), u(p)) of a layer."""
     cut = p[0].ndim - len(layer._solves.parameters[0].shape)
-    shapes = [jax.ShapeDtypeStruct((*p[0].shape[:cut], *end), p[0].dtype) for end in layer._ends]
+    shapes = [jax.ShapeDtypeStruct((*p[0].shape[:cut], *end), p[0].dtype) for end in layer._solves.ends]
 
     def host(*p: Any) -> Any:
         return layer._solution(keys, [np.asarray(a) for a in p])
 
-    return tuple(jax.pure_callback(host, shapes, *p, vmap_method="broadcast_all"))
+    return _on_host(host, shapes, p)
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -323,8 +302,7 @@ def _adjoint(layer: "ProblemLayer", *tensors: Any) -> Any:
         arrays = [np.asarray(a) for a in tensors]
         return layer._slopes(arrays[:-4], arrays[-4:], (True,) * len(p))
 
-    shapes = [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in p]
-    return tuple(jax.pure_callback(host, shapes, *tensors, vmap_method="broadcast_all"))
+    return _on_host(host, [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in p], tensors)
 
 
 def _adjoint_forward(layer: "ProblemLayer", *_: Any) -> Any:
@@ -350,15 +328,19 @@ _solve.defvjp(_solve_forward, _solve_backward)
 class ProblemLayer(_layer.ProblemLayer):
     """The solution of an optimal control problem as a differentiable function of its parameters.
 
-    A call `xs, us = layer(*values)` solves a problem for each row of the batch, one after the other, and returns states
-    (*batch, N + 1, nx) and controls (*batch, N, nu). If knots differ in nu, controls end with zeros. A problem starts
-    from the last solution of its row, or else from `start`. The backward pass multiplies by the derivative of the
-    solution by `condyle.optimal.Sensitivity`: one factorisation for each row, then one adjoint pass for each parameter.
+    A call `xs, us = layer(*values)` solves a problem for each row of the batch, and returns states (*batch, N + 1, nx)
+    and controls (*batch, N, nu). If knots differ in nu, controls end with zeros. A problem starts from its last
+    solution, or else from `start`. The backward pass multiplies by the derivative of the solution by
+    `condyle.optimal.Sensitivity`: one factorisation for each row, then one adjoint pass for each parameter.
     `jax.jit`, `grad`, `vmap` and `jacrev` work; compiled programs call the solver by `jax.pure_callback`.
 
-    problem: the problem, which the layer changes; do not use it elsewhere.
+    problem: the problem, which the layer changes; do not use it elsewhere. Or a function that makes the problem from
+        the parameters in `own`, given by name as arrays of floats.
     parameters: names of the parameters, in the order of a call's arguments. "x0" is the initial state, (nx); also
-        "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n).
+        "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n);
+        "duration", the duration of all knots without axes (s), "contact/NAME", the placement of a contact, (4, 4), and
+        names in `own`.
+    own: nominal values of parameters of one's own, by name. Derivatives with respect to them are central differences.
     by_knot: the names of parameters with a value for each knot, whose shapes begin with N + 1.
     robot: the robot, if its positions contain quaternions or pairs (cos, sin). Gradients are then as in `Dynamics`.
     solver: `Fddp` (default), `InteriorPoint` or `AugmentedLagrangian`.
@@ -366,13 +348,16 @@ class ProblemLayer(_layer.ProblemLayer):
     curvature: as for `Sensitivity`.
     on_failure: "raise", or "nan" for NaN in the solution of a row that has not converged. The row's gradients are NaN,
         or zero if the loss does not depend on the row.
+    threads: the number of threads, each of which solves its own problems of a batch. Only `Fddp` uses them.
     settings: settings of the solver, by name. The default tolerances are tight, because the error of a gradient is
         proportional to the error of the solution.
 
+    A layer can be pickled and copied, with its warm starts. Calls from several threads take turns.
+
     Arrays have float32 or float64 numbers, and all computations use float64. Second derivatives raise
     `NotImplementedError`, and forward mode (`jvp`) is a `TypeError`. Wrong shapes are a `ValueError`; integers are a
-    `TypeError`. If a solve has not converged, or derivatives do not exist, JAX raises its `JaxRuntimeError`, whose text
-    contains the `ProblemError` with the row.
+    `TypeError`. If a solve has not converged, or derivatives do not exist, `ProblemError` contains the row. In programs
+    that JAX compiles or maps, JAX raises its `JaxRuntimeError` instead, whose text contains the `ProblemError`.
 
     >>> import condyle, condyle.jax, jax, jax.numpy as jnp, numpy as np
     >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual
@@ -387,12 +372,6 @@ class ProblemLayer(_layer.ProblemLayer):
     >>> bool(slope(1e-3) < 0.0)  # a higher weight lowers the efforts
     True
     """
-
-    @property
-    def _ends(self) -> list[Shape]:
-        """The shapes of the states and controls of one problem."""
-        horizon = self._solves.problem.horizon
-        return [(horizon + 1, self._solves.problem.nx), (horizon, self._solves.nu)]
 
     def _arrays(self, names: Sequence[str], values: Sequence[Any]) -> list[Any]:
         return _floats(names, values)

@@ -23,7 +23,8 @@ You can define your own actions by the next state and the cost (`Action`), by ac
 functions accept numbers that carry their derivatives. `ControlRate` adds a cost of the change of the controls from knot
 to knot to an action of any kind.
 
-`Sensitivity` differentiates a solution with respect to initial state, targets, weights, bounds and other parameters.
+`Sensitivity` differentiates a solution with respect to initial state, targets, weights, bounds and other parameters,
+and `Sensitivities` many solutions.
 `condyle.torch.ProblemLayer` and `condyle.jax.ProblemLayer` do so inside PyTorch and JAX.
 
 The feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. The iterates are the same as in
@@ -55,6 +56,7 @@ from ._condyle import (
     Record,
     Residual,
     Schedule,
+    Sensitivities,
     Sensitivity,
     Sweep,
     Unicycle,
@@ -115,6 +117,7 @@ __all__ = [
     "RecordedTick",
     "Residual",
     "Schedule",
+    "Sensitivities",
     "Sensitivity",
     "SensitivityReport",
     "Solution",

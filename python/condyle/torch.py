@@ -30,9 +30,9 @@ PyTorch is an optional dependency: `pip install condyle[torch]`. The tests use v
 import importlib
 import inspect
 from collections.abc import Hashable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
-from . import _dynamics, _layer
+from . import _dynamics, _kinds, _layer
 from ._condyle import Model
 from ._operations import Operation, Shape
 
@@ -56,24 +56,41 @@ def _tensors(arrays: Sequence[Any], like: Any) -> tuple[Any, ...]:
 
 def _floats(names: Sequence[str], values: Sequence[Any]) -> list[Any]:
     """Returns the arguments as tensors on the CPU, with one type of floating-point numbers."""
-    tensors = []
+    tensors, widest = [], torch.float32
     for name, value in zip(names, values, strict=True):
-        tensor = torch.as_tensor(value)
-        if tensor.dtype not in (torch.float32, torch.float64):
-            raise TypeError(f"{name}: expected float32 or float64, found {str(tensor.dtype).removeprefix('torch.')}")
+        tensor = value if isinstance(value, torch.Tensor) else _tensor(name, value)
+        kind = tensor.dtype
+        if kind is torch.float64:
+            widest = kind
+        elif kind is not torch.float32:
+            raise TypeError(f"{name}: expected float32 or float64, found {str(kind).removeprefix('torch.')}")
         if tensor.device.type != "cpu":
             raise ValueError(
                 f"{name}: expected a tensor on the CPU, where Condyle computes, found device {tensor.device}; "
-                f"use {name}.cpu()"
+                "copy it by .cpu()"
             )
+        if tensor.layout is not torch.strided:
+            raise ValueError(f"{name}: expected a dense tensor, found {tensor.layout}; convert it by .to_dense()")
         tensors.append(tensor)
-    widest = torch.float64 if any(t.dtype == torch.float64 for t in tensors) else torch.float32
-    return [tensor if tensor.dtype == widest else tensor.to(widest) for tensor in tensors]
+    return [tensor if tensor.dtype is widest else tensor.to(widest) for tensor in tensors]
+
+
+def _tensor(name: str, value: Any) -> Any:
+    """Returns a number, a sequence or an array as a tensor."""
+    try:
+        return torch.as_tensor(value)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise TypeError(f"{name}: expected a tensor or numbers, found {type(value).__name__}: {error}") from None
 
 
 def _zeros(tensors: Sequence[Any], like: Sequence[Any]) -> list[Any]:
     """Returns the tensors, with zeros instead of None."""
     return [torch.zeros_like(x) if t is None else t for t, x in zip(tensors, like, strict=True)]
+
+
+def _given(tensors: Sequence[Any], like: Sequence[Any]) -> list[Any] | None:
+    """Returns the tensors, with zeros instead of None; None if all are None."""
+    return None if all(t is None for t in tensors) else _zeros(tensors, like)
 
 
 def _plain() -> bool:
@@ -130,12 +147,12 @@ class _Value(_Function):
 
     @staticmethod
     def forward(operation: Operation, needed: Any, *x: Any) -> Any:
-        return _tensors(operation.value(*_numpy(x)), x[0])
+        return _tensors(_kinds.value(operation, needed, *_numpy(x)), x[0])
 
     @staticmethod
     def backward(ctx: Any, *cotangents: Any) -> Any:
         operation, needed = ctx.operation, ctx.needs_input_grad[2:]
-        x, y = ctx.saved_tensors[: len(needed)], ctx.saved_tensors[len(needed) :]
+        x, y = _kinds.cut(operation, ctx.saved_tensors)
         if all(cotangent is None for cotangent in cotangents):
             return (None,) * (2 + len(x))
         full = _full(operation, cotangents, x)
@@ -148,7 +165,7 @@ class _Value(_Function):
     @staticmethod
     def jvp(ctx: Any, *tangents: Any) -> Any:
         needed = tuple(t is not None for t in tangents[2:])
-        x = ctx.saved_tensors[: len(needed)]
+        x, _ = _kinds.cut(ctx.operation, ctx.saved_tensors)
         return _Push.apply(ctx.operation, needed, *x, *_zeros(tangents[2:], x))
 
     @staticmethod
@@ -161,13 +178,12 @@ class _Pull(_Function):
 
     @staticmethod
     def forward(operation: Operation, needed: Any, *tensors: Any) -> Any:
-        arrays, n = _numpy(tensors), len(operation.inputs)
-        return _tensors(operation.pull(arrays[:n], arrays[n:], needed), tensors[0])
+        return _tensors(_kinds.pull(operation, needed, *_numpy(tensors)), tensors[0])
 
     @staticmethod
     def backward(ctx: Any, *incoming: Any) -> Any:
         operation, n = ctx.operation, len(ctx.operation.inputs)
-        x, cotangents = ctx.saved_tensors[:n], ctx.saved_tensors[n:]
+        x, cotangents = _kinds.cut(operation, ctx.saved_tensors)
         along = tuple(d is not None and needed for d, needed in zip(incoming, ctx.needed, strict=True))
         if not any(along):
             return (None,) * (2 + len(ctx.saved_tensors))
@@ -185,18 +201,11 @@ class _Pull(_Function):
 
     @staticmethod
     def jvp(ctx: Any, *tangents: Any) -> Any:
-        operation, n = ctx.operation, len(ctx.operation.inputs)
-        x, cotangents = ctx.saved_tensors[:n], ctx.saved_tensors[n:]
-        moved, changed = tangents[2 : 2 + n], tangents[2 + n :]
-        total = [torch.zeros_like(a) for a in x]
-        if any(t is not None for t in changed):
-            total = _Pull.apply(operation, ctx.needed, *x, *_zeros(changed, cotangents))
-        if any(t is not None for t in moved):
-            if not operation.twice:
-                raise operation.only_once()
-            bent = _Bend.apply(operation, ctx.needed, *x, *cotangents, *_zeros(moved, x))
-            total = [a + b for a, b in zip(total, bent, strict=True)]
-        return tuple(total)
+        x, cotangents = _kinds.cut(ctx.operation, ctx.saved_tensors)
+        moved, changed = _kinds.cut(ctx.operation, tangents[2:])
+        along = _given(moved, x), _given(changed, cotangents)
+        total = _kinds.pull_along(_FUNCTIONS, ctx.operation, ctx.needed, ctx.saved_tensors, *along)
+        return tuple(map(torch.zeros_like, x)) if total is None else tuple(total)
 
     @staticmethod
     def vmap(info: Any, in_dims: Any, *arguments: Any) -> Any:
@@ -208,13 +217,12 @@ class _Push(_Function):
 
     @staticmethod
     def forward(operation: Operation, needed: Any, *tensors: Any) -> Any:
-        arrays, n = _numpy(tensors), len(operation.inputs)
-        return _tensors(operation.push(arrays[:n], arrays[n:], needed), tensors[0])
+        return _tensors(_kinds.push(operation, needed, *_numpy(tensors)), tensors[0])
 
     @staticmethod
     def backward(ctx: Any, *incoming: Any) -> Any:
         operation, n = ctx.operation, len(ctx.operation.inputs)
-        x, tangents = ctx.saved_tensors[:n], ctx.saved_tensors[n:]
+        x, tangents = _kinds.cut(operation, ctx.saved_tensors)
         if all(cotangent is None for cotangent in incoming):
             return (None,) * (2 + len(ctx.saved_tensors))
         cotangents = _full(operation, incoming, x)
@@ -231,16 +239,10 @@ class _Push(_Function):
 
     @staticmethod
     def jvp(ctx: Any, *tangents: Any) -> Any:
-        operation, n = ctx.operation, len(ctx.operation.inputs)
-        x, along = ctx.saved_tensors[:n], ctx.saved_tensors[n:]
-        moved, changed = tangents[2 : 2 + n], tangents[2 + n :]
-        total = _Push.apply(operation, ctx.needed, *x, *_zeros(changed, along))
-        if any(t is not None for t in moved):
-            if not operation.twice:
-                raise operation.only_once()
-            curved = _Curve.apply(operation, None, *x, *along, *_zeros(moved, x))
-            total = tuple(a + b for a, b in zip(total, curved, strict=True))
-        return total
+        x, along = _kinds.cut(ctx.operation, ctx.saved_tensors)
+        moved, changed = _kinds.cut(ctx.operation, tangents[2:])
+        directions = _given(moved, x), _zeros(changed, along)
+        return _kinds.push_along(_FUNCTIONS, ctx.operation, ctx.needed, ctx.saved_tensors, *directions)
 
     @staticmethod
     def vmap(info: Any, in_dims: Any, *arguments: Any) -> Any:
@@ -252,9 +254,7 @@ class _Bend(_Function):
 
     @staticmethod
     def forward(operation: Operation, needed: Any, *tensors: Any) -> Any:
-        arrays, n, m = _numpy(tensors), len(operation.inputs), len(operation.outputs)
-        found = operation.bend(arrays[:n], arrays[n : n + m], arrays[n + m :], needed)
-        return _tensors(found, tensors[0])
+        return _tensors(_kinds.bend(operation, needed, *_numpy(tensors)), tensors[0])
 
     @staticmethod
     def backward(ctx: Any, *_: Any) -> Any:
@@ -272,8 +272,7 @@ class _Curve(_Function):
 
     @staticmethod
     def forward(operation: Operation, needed: Any, *tensors: Any) -> Any:
-        arrays, n = _numpy(tensors), len(operation.inputs)
-        return _tensors(operation.curve(arrays[:n], arrays[n : 2 * n], arrays[2 * n :]), tensors[0])
+        return _tensors(_kinds.curve(operation, needed, *_numpy(tensors)), tensors[0])
 
     @staticmethod
     def backward(ctx: Any, *_: Any) -> Any:
@@ -286,9 +285,33 @@ class _Curve(_Function):
         return _Curve._mapped(info, in_dims, *arguments)
 
 
-_kind: Any
+_FUNCTIONS = _kinds.Functions(_Pull.apply, _Push.apply, _Bend.apply, _Curve.apply)
+
+
+class _Bound(NamedTuple):
+    """Arguments as they were given; no argument of a `forward` has a default."""
+
+    args: tuple[Any, ...]
+    kwargs: dict[str, Any]
+
+    def apply_defaults(self) -> None:
+        """Changes nothing."""
+
+
+class _Signature(inspect.Signature):
+    """A signature that accepts all arguments. PyTorch binds each call's arguments to it, which would take 7 µs."""
+
+    def bind(self, *args: Any, **kwargs: Any) -> Any:
+        return _Bound(args, kwargs)
+
+
+def _fast(kind: Any) -> None:
+    """Stores a signature, because PyTorch would compute it for each call, in 60 µs."""
+    kind.forward.__signature__ = _Signature(inspect.signature(kind.forward).parameters.values())
+
+
 for _kind in (_Value, _Pull, _Push, _Bend, _Curve):
-    _kind.forward.__signature__ = inspect.signature(_kind.forward)  # PyTorch computes it for each call, in 60 µs
+    _fast(_kind)
 
 
 class Dynamics(_dynamics.Dynamics):
@@ -380,20 +403,24 @@ class _Adjoint(torch.autograd.Function):  # type: ignore[misc]
 
 
 for _kind in (_Solve, _Adjoint):
-    _kind.forward.__signature__ = inspect.signature(_kind.forward)
+    _fast(_kind)
 
 
 class ProblemLayer(_layer.ProblemLayer):
     """The solution of an optimal control problem as a differentiable function of its parameters.
 
-    A call `xs, us = layer(*values)` solves a problem for each row of the batch, one after the other, and returns states
-    (*batch, N + 1, nx) and controls (*batch, N, nu). If knots differ in nu, controls end with zeros. A problem starts
-    from the last solution of its row, or else from `start`. The backward pass multiplies by the derivative of the
-    solution by `condyle.optimal.Sensitivity`: one factorisation for each row, then one adjoint pass for each parameter.
+    A call `xs, us = layer(*values)` solves a problem for each row of the batch, and returns states (*batch, N + 1, nx)
+    and controls (*batch, N, nu). If knots differ in nu, controls end with zeros. A problem starts from its last
+    solution, or else from `start`. The backward pass multiplies by the derivative of the solution by
+    `condyle.optimal.Sensitivity`: one factorisation for each row, then one adjoint pass for each parameter.
 
-    problem: the problem, which the layer changes; do not use it elsewhere.
+    problem: the problem, which the layer changes; do not use it elsewhere. Or a function that makes the problem from
+        the parameters in `own`, given by name as arrays of floats.
     parameters: names of the parameters, in the order of a call's arguments. "x0" is the initial state, (nx); also
-        "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n).
+        "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n);
+        "duration", the duration of all knots without axes (s), "contact/NAME", the placement of a contact, (4, 4), and
+        names in `own`.
+    own: nominal values of parameters of one's own, by name. Derivatives with respect to them are central differences.
     by_knot: the names of parameters with a value for each knot, whose shapes begin with N + 1.
     robot: the robot, if its positions contain quaternions or pairs (cos, sin). Gradients are then as in `Dynamics`.
     solver: `Fddp` (default), `InteriorPoint` or `AugmentedLagrangian`.
@@ -401,8 +428,11 @@ class ProblemLayer(_layer.ProblemLayer):
     curvature: as for `Sensitivity`.
     on_failure: "raise", or "nan" for NaN in the solution of a row that has not converged. The row's gradients are NaN,
         or zero if the loss does not depend on the row.
+    threads: the number of threads, each of which solves its own problems of a batch. Only `Fddp` uses them.
     settings: settings of the solver, by name. The default tolerances are tight, because the error of a gradient is
         proportional to the error of the solution.
+
+    A layer can be pickled and copied, with its warm starts. Calls from several threads take turns.
 
     Tensors have float32 or float64 numbers, and all computations use float64. Second derivatives raise
     `NotImplementedError`. Wrong shapes, and tensors that are not on the CPU, are a `ValueError`; integers are a

@@ -47,6 +47,7 @@ mod made_for;
 mod model;
 mod mpc;
 mod optimal;
+mod pulled;
 mod regressors;
 mod robots;
 mod signals;
@@ -131,9 +132,11 @@ mod _condyle {
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,
         ControlRate, Cost, DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics,
-        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivity, Sweep, Unicycle,
-        WrenchCone, rollout_many, solve_variations,
+        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sensitivities, Sensitivity, Sweep,
+        Unicycle, WrenchCone, rollout_many, solve_variations,
     };
+    #[pymodule_export]
+    use pulled::rnea_pull;
     #[pymodule_export]
     use regressors::{
         joint_torque_regressor, kinetic_energy_regressor, passive_torque, passive_torque_derivatives,

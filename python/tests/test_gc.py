@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp, InteriorPoint, Problem, Sensitivity
+from condyle.optimal import (
+    Action,
+    AugmentedLagrangian,
+    ConstrainedAction,
+    Fddp,
+    InteriorPoint,
+    Problem,
+    Sensitivities,
+    Sensitivity,
+)
 
 
 class Marker:
@@ -46,6 +55,7 @@ MAKERS: dict[str, Any] = {
     "Problem": lambda f, g: problem(action(f)),
     "Problem, constrained": lambda f, g: problem(ConstrainedAction(action(f), 1, g)),
     "Fddp": lambda f, g: solved(Fddp, action(f)),
+    "Sensitivities": lambda f, g: Sensitivities([Sensitivity(solved(Fddp, action(f)), curvature="gauss_newton")]),
     "Sensitivity": lambda f, g: Sensitivity(solved(Fddp, action(f)), curvature="gauss_newton"),
     "AugmentedLagrangian": lambda f, g: solved(AugmentedLagrangian, ConstrainedAction(action(f), 1, g)),
     "InteriorPoint": lambda f, g: solved(InteriorPoint, ConstrainedAction(action(f), 1, g)),

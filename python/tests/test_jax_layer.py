@@ -1,5 +1,7 @@
 """Tests of `condyle.jax.ProblemLayer`: gradients, transformations, warm starts, types and errors."""
 
+import copy
+import pickle
 from collections.abc import Iterator
 from typing import Any
 
@@ -7,7 +9,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import Activation, Cost, FreeDynamics, Problem, Residual, Sensitivity
+from condyle.optimal import Activation, Cost, FreeDynamics, Problem, ProblemError, Residual, Sensitivity
 
 jax = pytest.importorskip("jax")
 
@@ -81,6 +83,25 @@ def test_warm_starts_are_kept() -> None:
     assert all(a < b for a, b in zip(layer.iterations, first, strict=True))
 
 
+def test_durations_and_parameters_of_ones_own() -> None:
+    def make(armature: Any) -> Problem:
+        model = ARM.with_armature(np.full(7, armature))
+        rest, effort = Cost("rest", 0.2, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
+        reach = Cost("reach", 20.0, Residual.frame_translation(model, "tool", GOAL))
+        knot = FreeDynamics(model, 0.05, [rest, effort, reach])
+        return Problem(X0, [knot], [0] * KNOTS, FreeDynamics(model, None, [rest, reach]))
+
+    layer = ProblemLayer(make, ["armature", "duration"], own={"armature": 0.2}, threads=2)
+    function = jax.jit(lambda scale, armature: loss(layer(armature, 0.05 * scale)))
+    check_grads(function, (1.0, jnp.array([0.2, 0.3])), order=1, modes=["rev"], eps=5e-5, atol=1e-5, rtol=1e-5)
+
+
+def test_copies() -> None:
+    layer = pickle.loads(pickle.dumps(ProblemLayer(arm_problem(1e3), ["target/reach"])))
+    first = jax.jit(layer)(jnp.array(GOAL))[0]
+    assert np.allclose(first, copy.deepcopy(layer)(GOAL)[0], atol=1e-8)
+
+
 def test_types() -> None:
     layer = ProblemLayer(arm_problem(1e3), ["target/reach"])
     exact = jax.grad(lambda goal: loss(layer(goal)))(jnp.array(GOAL))
@@ -96,8 +117,11 @@ def test_types() -> None:
 def test_rows_that_fail() -> None:
     problem = arm_problem()
     goals = jnp.array([GOAL, GOAL, GOAL]).at[1, 0].set(jnp.nan)
+    for run in (lambda layer: layer(goals), lambda layer: jax.grad(lambda goals: layer(goals)[1].sum())(goals)):
+        with pytest.raises(ProblemError, match="row 1: "):
+            run(ProblemLayer(problem, ["target/reach"]))
     with pytest.raises(jax.errors.JaxRuntimeError, match="ProblemError: row 1: "):
-        jax.block_until_ready(ProblemLayer(problem, ["target/reach"])(goals))
+        jax.block_until_ready(jax.jit(ProblemLayer(problem, ["target/reach"]))(goals))
     layer = ProblemLayer(problem, ["target/reach"], on_failure="nan")
     xs, _ = layer(goals)
     assert np.isnan(xs[1]).all() and np.isfinite(xs[0]).all()
@@ -112,6 +136,11 @@ def test_errors() -> None:
         layer(GOAL[:2], X0)
     with pytest.raises(TypeError, match="target/reach: expected float32 or float64, found int"):
         layer(jnp.array([1, 2, 3]), X0)
+    for value, found in ((None, "NoneType"), ("goal", "str")):
+        with pytest.raises(TypeError, match=f"target/reach: expected an array or numbers, found {found}"):
+            layer(value, X0)
+    with pytest.raises(ValueError, match=r"target/reach: expected shape \(..., 3\), found \(2,\)"):
+        jax.jit(layer)(GOAL[:2], X0)  # when the function is traced
     with pytest.raises(NotImplementedError, match="ProblemLayer: second derivatives of a solution do not exist"):
         jax.grad(lambda goal: jax.grad(lambda goal: loss(layer(goal, X0)))(goal).sum())(jnp.array(GOAL))
     with pytest.raises(TypeError, match="forward-mode"):

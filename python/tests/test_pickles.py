@@ -21,7 +21,8 @@ PROBLEM = Problem(np.zeros(14), [STEP], [0] * 3, FreeDynamics(ARM, None, []))
 
 # Classes of computations in progress, such as factors and builders.
 UNDER_WAY = {
-    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Policy", "Record", "Sensitivity", "Sweep",
+    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Policy", "Record", "Sensitivities",
+    "Sensitivity", "Sweep",
 }  # fmt: skip
 
 

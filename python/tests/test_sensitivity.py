@@ -16,6 +16,7 @@ from condyle.optimal import (
     Problem,
     ProblemError,
     Residual,
+    Sensitivities,
     Sensitivity,
     SensitivityReport,
 )
@@ -24,6 +25,7 @@ KNOTS = 12
 STEP = 1e-4
 X0 = np.r_[0.1, 0.4, -0.2, 1.2, 0.3, 0.8, 0.2, np.zeros(7)]
 GOAL = np.array([0.3, 0.3, 0.5])
+SIDE = np.array([0.02, -0.01, 0.0])
 BOUND = 27.0
 
 
@@ -142,6 +144,52 @@ def test_own_parameters(arm, solver, loss):
         sensitivity.define("broken", 1, lambda change: 3)
     with pytest.raises(ProblemError, match="is no parameter"):
         sensitivity.gradient("broken", *loss)
+    another = r"is another one than the solved problem: the cost of knot 0 is"
+    with pytest.raises(ProblemError, match=another):
+        sensitivity.define("goal", 3, lambda change: problem_of(arm, goal=GOAL + change + 0.1))
+    with pytest.raises(ValueError, match='name: "target/reach" is a parameter that needs no definition'):
+        sensitivity.define("target/reach", 3, lambda change: problem_of(arm, goal=GOAL + change))
+    assert sensitivity.gradient("goal", *loss).shape == (3,)  # the first definition remains
+
+
+def test_several_parameters_at_once(solver, loss):
+    sensitivity = Sensitivity(solver)
+    names = ["x0", "target/reach", "weight/reach"]
+    found = sensitivity.gradients(names, *loss, by_knot=["target/reach"])
+    assert [gradient.shape for gradient in found] == [(14,), (KNOTS + 1, 3), (1,)]
+    for name, gradient in zip(names, found, strict=True):
+        assert np.array_equal(gradient, sensitivity.gradient(name, *loss, by_knot=name == "target/reach"))
+    assert sensitivity.gradients([], *loss) == []
+    with pytest.raises(ValueError, match='by_knot: expected names of parameters, found "weight/rest"'):
+        sensitivity.gradients(names, *loss, by_knot=["weight/rest"])
+
+
+def test_many_solutions(arm):
+    problem = problem_of(arm)
+    names, each = ["x0", "target/reach"], []
+    for k in range(10):
+        problem.set_references("reach", np.tile(GOAL + k * SIDE, (KNOTS + 1, 1)))
+        each.append(Sensitivity(solved(problem), curvature="gauss_newton").prepare(names))
+    assert len({one.report.active_controls for one in each}) > 1
+    generator = np.random.default_rng(3)
+    by_xs, by_us = generator.standard_normal((10, KNOTS + 1, 14)), generator.standard_normal((10, KNOTS, 7))
+    many = Sensitivities(each)
+    assert (len(many), many.in_lanes) == (10, 10)
+    found = many.gradients(names, by_xs, by_us, by_knot=["target/reach"])
+    assert [gradient.shape for gradient in found] == [(10, 14), (10, KNOTS + 1, 3)]
+    problem.set_x0(X0)  # this changes nothing
+    last = each[-1].gradients(names, by_xs[-1], by_us[-1], by_knot=["target/reach"])
+    for ours, alone in zip(found, last, strict=True):
+        assert np.abs(ours[-1] - alone).max() < 1e-12 * np.abs(alone).max()
+    with pytest.raises(ProblemError, match="has changed since the sensitivity was created"):
+        each[0].gradient("x0", by_xs[0], by_us[0])  # the problem has the last target
+    problem.set_references("reach", np.tile(GOAL, (KNOTS + 1, 1)))
+    first = each[0].gradients(names, by_xs[0], by_us[0])
+    assert np.abs(found[0][0] - first[0]).max() < 1e-12 * np.abs(first[0]).max()
+    with pytest.raises(ValueError, match="by_xs"):
+        many.gradients(names, by_xs[:3], by_us)
+    with pytest.raises(ProblemError, match="the batch is empty"):
+        Sensitivities([])
 
 
 def test_the_gradient_of_the_first_control(solver):
@@ -186,6 +234,8 @@ def test_limits(kind):
 
 def test_errors(arm, loss):
     problem = problem_of(arm, bound=None)
+    with pytest.raises(ProblemError, match="the solver has not solved the problem yet"):
+        Sensitivity(Fddp(problem))
     short = Fddp(problem, max_iterations=1)
     short.solve(np.tile(X0, (KNOTS + 1, 1)), np.zeros((KNOTS, 7)))
     with pytest.raises(ProblemError, match="reached the limit of iterations, expected one that converged"):

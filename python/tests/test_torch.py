@@ -258,7 +258,7 @@ def test_some_arguments_need_no_gradient() -> None:
         (
             lambda q: q.to("meta"),
             ValueError,
-            "q: expected a tensor on the CPU, where Condyle computes, found device meta; use q.cpu()",
+            "q: expected a tensor on the CPU, where Condyle computes, found device meta; copy it by .cpu()",
         ),
         (
             lambda q: q.expand(3, 7),

@@ -102,8 +102,8 @@ pub use problem::{
     Lqr, NumDiff, PathConstraint, Problem, RolloutResults, Rollouts, Schedule, Unicycle,
 };
 pub use sensitivity::{
-    Adjoint, Curvature, Parameter, ParameterJacobian, Sensitivity, SensitivityReport, SensitivitySettings,
-    SolutionJacobian, WeakestBound,
+    Adjoint, Curvature, Parameter, ParameterJacobian, Sensitivities, Sensitivity, SensitivityReport,
+    SensitivitySettings, SolutionJacobian, WeakestBound,
 };
 pub use solvers::{
     AugmentedLagrangian, BatchFddp, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint,

@@ -6,6 +6,8 @@ mod common;
 mod constraints;
 #[path = "sensitivity/faults.rs"]
 mod faults;
+#[path = "sensitivity/many.rs"]
+mod many;
 
 use common::{Cartpole, HANGING, Limited, cartpole_action, random, straight};
 use condyle_dynamics::{

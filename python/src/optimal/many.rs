@@ -26,8 +26,9 @@ const NUMBERS: [&str; 3] = ["cost", "gap", "seconds"];
 /// solver: the settings of all solves.
 /// count: the number V of variations.
 /// data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name of a cost, numbers) called
-///     "references" and "weights", with the numbers of all knots in a row.
-/// start: the states and controls from which all variations start.
+///     "references" and "weights", with the numbers of all knots in a row. Also "xs" and "us", with the states and
+///     controls from which each variation starts, the numbers of all knots in a row.
+/// start: the states and controls from which all variations start, unless `data` has their own.
 /// vary: None, or a function of the problem and an item that changes the problem or returns another one.
 /// items: the arguments of `vary`.
 /// keep: the arrays of each solution to keep.
@@ -61,6 +62,10 @@ pub(crate) fn solve_variations<'py>(
     drop(inner);
 
     let x0 = data.get_item("x0")?.map(|x0| matrix("x0", &x0, [count, nx]).map(|x0| x0.to_vec())).transpose()?;
+    let rows_of = |name: &str, size| {
+        data.get_item(name)?.map(|rows| matrix(name, &rows, [count, size]).map(|rows| rows.to_vec())).transpose()
+    };
+    let starts = [rows_of("xs", xs.len())?, rows_of("us", us.len())?];
     let [references, weights] = ["references", "weights"].map(|name| rows(data, name, count));
     let mut kept = Vec::new();
     for name in NUMBERS {
@@ -80,6 +85,7 @@ pub(crate) fn solve_variations<'py>(
     let many = Many {
         shell,
         x0,
+        starts,
         references: references?,
         weights: weights?,
         vary,
@@ -127,6 +133,8 @@ struct Many<'a> {
     /// Problem that is passed to `vary`.
     shell: &'a Py<Problem>,
     x0: Option<Vec<f64>>,
+    /// States and controls from which each variation starts.
+    starts: [Option<Vec<f64>>; 2],
     references: Vec<(String, Vec<f64>)>,
     weights: Vec<(String, Vec<f64>)>,
     vary: Option<(Py<PyAny>, Py<PyList>)>,
@@ -205,11 +213,16 @@ impl Many<'_> {
 impl ManyProblems for Many<'_> {
     type Error = Excluded;
 
-    fn start(&self, i: usize, problem: &mut rust::Problem, xs: &mut [f64], _: &mut [f64]) -> Result<(), Excluded> {
+    fn start(&self, i: usize, problem: &mut rust::Problem, xs: &mut [f64], us: &mut [f64]) -> Result<(), Excluded> {
         let nx = problem.nx();
         self.change(i, problem)?;
         let row = |numbers: &[f64], count: usize| i * (numbers.len() / count)..(i + 1) * (numbers.len() / count);
         let count = self.columns.lock().unwrap_or_else(PoisonError::into_inner).status.len();
+        for (start, rows) in [&mut *xs, us].into_iter().zip(&self.starts) {
+            if let Some(rows) = rows {
+                start.copy_from_slice(&rows[row(rows, count)]);
+            }
+        }
         if let Some(x0) = &self.x0 {
             problem.set_x0(&x0[row(x0, count)])?;
         }

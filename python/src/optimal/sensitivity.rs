@@ -3,10 +3,10 @@
 use super::evaluation::{by_knot, named_controls};
 use super::problem::{Problem, lock};
 use super::solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
-use crate::arrays::{Give, class, matrix, output};
+use crate::arrays::{Give, class, matrix, output, vector};
 use crate::exceptions::{problem_error, within, wrong_word};
 use condyle::optimal as rust;
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::{Curvature, Parameter, ParameterJacobian, SensitivitySettings};
@@ -58,9 +58,11 @@ const MOST_ENTRIES: usize = 4096;
 /// (3,)
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Sensitivity {
-    problem: Py<Problem>,
-    inner: Mutex<rust::Sensitivity>,
-    jacobians: Mutex<HashMap<String, ParameterJacobian>>,
+    pub(super) problem: Py<Problem>,
+    pub(super) inner: Mutex<rust::Sensitivity>,
+    pub(super) jacobians: Mutex<HashMap<String, ParameterJacobian>>,
+    /// The problem's number of changes at which it was the solved problem.
+    revision: Mutex<u64>,
 }
 
 #[pymethods]
@@ -68,13 +70,7 @@ impl Sensitivity {
     #[new]
     #[pyo3(signature = (solver, *, curvature="exact", tolerance=1e-3, strictness=1e-4))]
     fn new(solver: &Bound<'_, PyAny>, curvature: &str, tolerance: f64, strictness: f64) -> PyResult<Self> {
-        let curvature = match curvature {
-            "exact" => Curvature::Exact,
-            "dynamics" => Curvature::Dynamics,
-            "gauss_newton" => Curvature::GaussNewton,
-            other => return Err(wrong_word("curvature", "'exact', 'dynamics' or 'gauss_newton'", other)),
-        };
-        let settings = SensitivitySettings { curvature, tolerance, strictness };
+        let settings = SensitivitySettings { curvature: curvature_of(curvature)?, tolerance, strictness };
         let py = solver.py();
         if let Ok(solver) = solver.cast::<Fddp>() {
             let (solver, problem) = (lock("solver", &solver.get().solver)?, &solver.get().problem);
@@ -91,6 +87,37 @@ impl Sensitivity {
                 solver.get_type().name()?
             )))
         }
+    }
+
+    /// Computes the derivatives at a solution of `Fddp` with the given states, controls and gains, which may come from
+    /// `solve_many`. The problem must be the solved problem.
+    #[staticmethod]
+    fn _at(
+        problem: &Bound<'_, Problem>,
+        xs: &Bound<'_, PyAny>,
+        us: &Bound<'_, PyAny>,
+        K: &Bound<'_, PyAny>,
+        curvature: &str,
+    ) -> PyResult<Self> {
+        let settings = SensitivitySettings { curvature: curvature_of(curvature)?, ..Default::default() };
+        let solution = {
+            let inner = lock("problem", &problem.get().inner)?;
+            let mut solution = rust::Fddp::new(&inner).solution().clone();
+            solution.xs = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
+            solution.us = named_controls("us", &inner, us)?;
+            let size = solution.K.iter().map(|K| K.len()).sum();
+            let numbers = vector("K", K, size)?;
+            let mut rest = &numbers[..];
+            for gains in &mut solution.K {
+                let (nu, ndx) = gains.shape();
+                let (own, others) = rest.split_at(nu * ndx);
+                *gains = nalgebra::DMatrix::from_row_slice(nu, ndx, own);
+                rest = others;
+            }
+            solution.status = rust::Status::Converged;
+            solution
+        };
+        Self::of(problem.py(), problem.as_unbound(), &solution, None, settings)
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -134,7 +161,7 @@ impl Sensitivity {
     ///     parameter that only this knot uses, such as the rows of `Problem.references`.
     ///
     /// Raises `ProblemError` if the parameter does not exist, or if the problem has changed since this object was
-    /// created and the derivatives of this parameter are not stored yet. Stored ones belong to the solved problem.
+    /// created.
     #[pyo3(signature = (parameter, by_xs=None, by_us=None, by_knot=false))]
     fn gradient<'py>(
         &self,
@@ -144,17 +171,42 @@ impl Sensitivity {
         by_us: Option<&Bound<'py, PyAny>>,
         by_knot: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.find(parameter)?;
-        let mut inner = lock("sensitivity", &self.inner)?;
-        let [by_states, by_controls] = self.loss(by_xs, by_us)?;
-        let jacobians = lock("sensitivity", &self.jacobians)?;
-        let jacobian = &jacobians[parameter];
-        let adjoint = inner.adjoint(&by_states, &by_controls).map_err(problem_error)?;
-        if !by_knot {
-            return adjoint.gradient(jacobian).give(py, None);
-        }
-        let parts = adjoint.gradient_by_knot(jacobian);
-        output(py, None, &[parts.len(), jacobian.size()], |out| out.copy_from_slice(&parts.concat()))
+        let names = [parameter.to_owned()];
+        let by_knot = if by_knot { &names[..] } else { &[] };
+        Ok(self.all(py, &names, [by_xs, by_us], by_knot)?.remove(0))
+    }
+
+    /// Computes the gradients of a loss with respect to several parameters, by one solution of the adjoint problem.
+    /// Returns a list with an array for each parameter.
+    ///
+    /// parameters: the names of the parameters.
+    /// by_xs, by_us: as for `gradient`.
+    /// by_knot: the names of parameters for which the part of each knot is returned, as by `gradient`.
+    ///
+    /// Raises `ProblemError` as `gradient` does.
+    #[pyo3(signature = (parameters, by_xs=None, by_us=None, by_knot=Vec::new()))]
+    fn gradients<'py>(
+        &self,
+        py: Python<'py>,
+        parameters: Vec<String>,
+        by_xs: Option<&Bound<'py, PyAny>>,
+        by_us: Option<&Bound<'py, PyAny>>,
+        by_knot: Vec<String>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        check_names(&parameters, &by_knot)?;
+        self.all(py, &parameters, [by_xs, by_us], &by_knot)
+    }
+
+    /// Computes and stores the derivatives of the optimality conditions with respect to parameters, for later gradients
+    /// by `Sensitivities`. Returns this object.
+    ///
+    /// parameters: the names of the parameters.
+    ///
+    /// Raises `ProblemError` if a parameter does not exist, or if the problem has changed since this object was
+    /// created.
+    fn prepare<'py>(slf: &Bound<'py, Self>, parameters: Vec<String>) -> PyResult<Bound<'py, Self>> {
+        parameters.iter().try_for_each(|name| slf.get().find(name))?;
+        Ok(slf.clone())
     }
 
     /// Computes the gradients of a loss with respect to the initial state and to all active bounds, as
@@ -168,6 +220,7 @@ impl Sensitivity {
         by_xs: Option<&Bound<'py, PyAny>>,
         by_us: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
+        self.check()?;
         let mut inner = lock("sensitivity", &self.inner)?;
         let [by_states, by_controls] = self.loss(by_xs, by_us)?;
         let adjoint = inner.adjoint(&by_states, &by_controls).map_err(problem_error)?;
@@ -187,6 +240,7 @@ impl Sensitivity {
     ///
     /// Raises `ProblemError` as `gradient` does.
     fn jacobian<'py>(&self, py: Python<'py>, parameter: &str) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        self.check()?;
         self.find(parameter)?;
         let mut inner = lock("sensitivity", &self.inner)?;
         let jacobians = lock("sensitivity", &self.jacobians)?;
@@ -206,16 +260,22 @@ impl Sensitivity {
     /// Defines a parameter of your own, whose derivatives are central differences: the inertia of a body, a coefficient
     /// of friction, or any other number of which problems are built.
     ///
-    /// name: the name, for `gradient` and `jacobian`. A parameter of this name is replaced.
+    /// name: the name, for `gradient` and `jacobian`. An earlier definition of this name is replaced.
     /// size: the number of entries.
     /// build: a function that returns the `Problem` for a change of the entries from the solved problem. It is called
-    ///     twice for each entry.
+    ///     with zeros first, and then twice for each entry.
     /// step: the size of these changes.
     ///
-    /// Raises `ProblemError` if a problem has other dimensions, and exceptions of `build`.
+    /// Raises `ProblemError` if the problem for zeros is another one than the solved problem, or if a problem has other
+    /// dimensions; `ValueError` for the name of a parameter that exists already; and exceptions of `build`.
     #[pyo3(signature = (name, size, build, step=1e-5))]
     fn define(&self, name: &str, size: usize, build: &Bound<'_, PyAny>, step: f64) -> PyResult<()> {
         let size = within("size", size, 1, MOST_ENTRIES)?;
+        if name.parse::<Parameter>().is_ok() {
+            return Err(PyValueError::new_err(format!(
+                "name: {name:?} is a parameter that needs no definition, expected another name"
+            )));
+        }
         let (py, mut raised) = (build.py(), None);
         let inner = lock("sensitivity", &self.inner)?;
         let problem = lock("problem", &self.problem.get().inner)?;
@@ -247,6 +307,7 @@ impl Sensitivity {
     /// Computes the derivative of the first control with respect to the initial state, (nu, ndx): the gradient of the
     /// policy that a controller executes. Without active limits, it is a gain of the factorisation.
     fn first_control_by_x0<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.check()?;
         lock("sensitivity", &self.inner)?.first_control_by_x0().map_err(problem_error)?.give(py, None)
     }
 
@@ -259,6 +320,16 @@ impl Sensitivity {
             report.active_controls,
             report.active_rows
         ))
+    }
+}
+
+/// Returns the curvature with this name.
+fn curvature_of(name: &str) -> PyResult<Curvature> {
+    match name {
+        "exact" => Ok(Curvature::Exact),
+        "dynamics" => Ok(Curvature::Dynamics),
+        "gauss_newton" => Ok(Curvature::GaussNewton),
+        other => Err(wrong_word("curvature", "'exact', 'dynamics' or 'gauss_newton'", other)),
     }
 }
 
@@ -276,20 +347,63 @@ impl Sensitivity {
         let found = py.detach(|| rust::Sensitivity::new(inner, solution, outcome, settings));
         problem.get().raise()?;
         let (found, jacobians) = (Mutex::new(found.map_err(problem_error)?), Mutex::default());
-        Ok(Self { problem: problem.clone_ref(py), inner: found, jacobians })
+        let revision = Mutex::new(inner.revision());
+        Ok(Self { problem: problem.clone_ref(py), inner: found, jacobians, revision })
+    }
+
+    /// Returns `Ok` if the problem is still the solved one. It is evaluated only after a call that may have changed it.
+    fn check(&self) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut revision = lock("sensitivity", &self.revision)?;
+        if problem.revision() != *revision {
+            let found = lock("sensitivity", &self.inner)?.check_problem(&mut problem);
+            self.problem.get().raise()?;
+            found.map_err(problem_error)?;
+            *revision = problem.revision();
+        }
+        Ok(())
     }
 
     /// Computes the derivatives with respect to a named parameter, unless they are stored.
-    fn find(&self, name: &str) -> PyResult<()> {
-        let mut jacobians = lock("sensitivity", &self.jacobians)?;
-        if !jacobians.contains_key(name) {
-            let parameter: Parameter = name.parse().map_err(problem_error)?;
-            let inner = lock("sensitivity", &self.inner)?;
-            let found = inner.jacobian(&mut *lock("problem", &self.problem.get().inner)?, &parameter);
-            self.problem.get().raise()?;
-            jacobians.insert(name.to_owned(), found.map_err(problem_error)?);
+    pub(super) fn find(&self, name: &str) -> PyResult<()> {
+        if lock("sensitivity", &self.jacobians)?.contains_key(name) {
+            return Ok(());
         }
+        let parameter: Parameter = name.parse().map_err(problem_error)?;
+        self.check()?;
+        let inner = lock("sensitivity", &self.inner)?;
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let found = inner.jacobian(&mut problem, &parameter);
+        self.problem.get().raise()?;
+        let found = found.map_err(problem_error)?;
+        *lock("sensitivity", &self.revision)? = problem.revision(); // the parameter has its old value again
+        lock("sensitivity", &self.jacobians)?.insert(name.to_owned(), found);
         Ok(())
+    }
+
+    /// Computes the gradients with respect to several parameters.
+    fn all<'py>(
+        &self,
+        py: Python<'py>,
+        parameters: &[String],
+        [by_xs, by_us]: [Option<&Bound<'py, PyAny>>; 2],
+        by_knot: &[String],
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        self.check()?;
+        parameters.iter().try_for_each(|name| self.find(name))?;
+        let mut inner = lock("sensitivity", &self.inner)?;
+        let [by_states, by_controls] = self.loss(by_xs, by_us)?;
+        let jacobians = lock("sensitivity", &self.jacobians)?;
+        let adjoint = inner.adjoint(&by_states, &by_controls).map_err(problem_error)?;
+        let gradient = |name: &String| {
+            let jacobian = &jacobians[name];
+            if !by_knot.contains(name) {
+                return adjoint.gradient(jacobian).give(py, None);
+            }
+            let parts = adjoint.gradient_by_knot(jacobian);
+            output(py, None, &[parts.len(), jacobian.size()], |out| out.copy_from_slice(&parts.concat()))
+        };
+        parameters.iter().map(gradient).collect()
     }
 
     /// Reads the gradients of a loss.
@@ -304,6 +418,19 @@ impl Sensitivity {
             Some(by_us) => named_controls("by_us", &problem, by_us)?,
             None => vec![0.0; problem.control_range(rows - 1).start],
         };
+        for (name, numbers) in [("by_xs", &by_states), ("by_us", &by_controls)] {
+            if let Some(index) = numbers.iter().position(|x| !x.is_finite()) {
+                return Err(problem_error(rust::Error::NotFinite { name, index, value: numbers[index] }));
+            }
+        }
         Ok([by_states, by_controls])
+    }
+}
+
+/// Returns `Ok` if the names for parts by knot are names of parameters.
+pub(super) fn check_names(parameters: &[String], by_knot: &[String]) -> PyResult<()> {
+    match by_knot.iter().find(|name| !parameters.contains(name)) {
+        Some(name) => Err(PyValueError::new_err(format!("by_knot: expected names of parameters, found {name:?}"))),
+        None => Ok(()),
     }
 }

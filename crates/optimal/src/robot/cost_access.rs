@@ -143,9 +143,15 @@ impl Problem {
         self.assert_knot(t);
         let action = match self.knot_models().get(t) {
             Some(&index) => self.chosen(index)?,
-            None => self.action_mut(t),
+            None => self.changing_terminal(),
         };
         terms_of(action)?.costs_mut(Some(t)).cost_mut(name)
+    }
+
+    /// Returns the terminal action, to be changed.
+    fn changing_terminal(&mut self) -> &mut dyn ActionModel {
+        self.mark_changed();
+        self.action_mut(self.horizon())
     }
 
     /// Calls `change` for each cost called `name`: in the costs of all models, of knots with separate costs, and of the
@@ -158,11 +164,11 @@ impl Problem {
         name: &str,
         mut change: impl FnMut(&mut CostMut<'_>) -> Result<(), Error>,
     ) -> Result<bool, Error> {
-        let (mut found, horizon) = (false, self.horizon());
+        let mut found = false;
         for index in (0..self.model_count()).map(Some).chain([None]) {
             let action = match index {
                 Some(index) => self.chosen(index),
-                None => Some(self.action_mut(horizon)),
+                None => Some(self.changing_terminal()),
             };
             let Some(terms) = action.and_then(terms_of) else { continue };
             for mut cost in terms.all_costs_mut().filter_map(|costs| costs.cost_mut(name)) {
@@ -183,7 +189,7 @@ impl Problem {
         Error::check_size("knot", t, self.horizon())?;
         let action = match self.knot_models().get(t) {
             Some(&index) => self.chosen(index),
-            None => Some(self.action_mut(t)),
+            None => Some(self.changing_terminal()),
         };
         let Some(terms) = action.and_then(terms_of) else { return Ok(false) };
         terms.set_costs(t, costs).map(|()| true)

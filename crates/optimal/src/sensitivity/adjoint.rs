@@ -4,10 +4,11 @@
 //! along p is M dw = −F dp, so for a loss with the gradient l, dL/dp = lᵀ dw/dp = −aᵀF with M a = l.
 
 use super::parameters::ParameterJacobian;
-use super::point::{Point, Rows};
+use super::point::{Active, Point, Rows};
 use super::system::{System, Vectors, slice};
 use crate::error::Error;
 use crate::problem::Shape;
+use nalgebra::{DMatrix, DVector};
 
 /// Solution of the adjoint problem for a loss L(x, u).
 ///
@@ -39,8 +40,41 @@ pub struct Adjoint {
     shape: Shape,
     solution: Vectors,
     given: Vectors,
+    /// Controls at a bound, in the order of the knots.
+    held: Vec<Held>,
     /// Derivatives with respect to the bounds of the controls at a bound, for each knot.
     kappa: Vec<Vec<f64>>,
+}
+
+/// Control at a bound, with its columns of the matrices of its knot.
+#[derive(Debug, Clone)]
+struct Held {
+    knot: usize,
+    /// Index in the controls of all knots.
+    index: usize,
+    S: DVector<f64>,
+    R: DVector<f64>,
+    B: DVector<f64>,
+    D: DVector<f64>,
+}
+
+impl Held {
+    fn all(point: &Point) -> Vec<Self> {
+        let of_knot = |(t, active): (usize, &Vec<Active>)| {
+            let (lq, rows) = (&point.knots[t], &point.rows[t]);
+            let column = |matrix: &DMatrix<f64>, i: usize| matrix.column(i).clone_owned();
+            let one = |&(i, _): &Active| Self {
+                knot: t,
+                index: point.shape.offsets[t] + i,
+                S: column(&lq.S, i),
+                R: column(&lq.R, i),
+                B: column(&lq.B, i),
+                D: column(&rows.D, i),
+            };
+            active.iter().map(one).collect::<Vec<_>>()
+        };
+        point.controls.iter().enumerate().flat_map(of_knot).collect()
+    }
 }
 
 impl Adjoint {
@@ -52,6 +86,7 @@ impl Adjoint {
             x0: vec![0.0; point.shape.ndx],
             control_bounds: zeros.u.clone(),
             row_bounds: point.rows.iter().map(|rows| vec![0.0; rows.y.len()]).collect(),
+            held: Held::all(point),
             kappa: point.controls.iter().map(|active| vec![0.0; active.len()]).collect(),
             solution: zeros.clone(),
             given: zeros,
@@ -73,6 +108,17 @@ impl Adjoint {
         &self.solution.dynamics
     }
 
+    /// Returns the indices of the controls at a bound in the controls of all knots.
+    pub(super) fn held(&self) -> impl Iterator<Item = usize> {
+        self.held.iter().map(|held| held.index)
+    }
+
+    /// Returns ξ, υ and η, to be written.
+    pub(super) fn solution_mut(&mut self) -> [&mut [f64]; 3] {
+        let Vectors { x, u, dynamics, .. } = &mut self.solution;
+        [x, u, dynamics]
+    }
+
     /// Solves the adjoint problem for the gradients of a loss.
     pub(super) fn run(
         &mut self,
@@ -80,40 +126,40 @@ impl Adjoint {
         system: &mut System,
         [by_states, by_controls]: [&[f64]; 2],
     ) -> Result<(), Error> {
-        let Self { x0, control_bounds, row_bounds, shape, solution, given, kappa } = self;
+        let Self { solution, given, held, .. } = self;
         given.x.copy_from_slice(by_states);
         given.u.copy_from_slice(by_controls);
-        for (t, active) in point.controls.iter().enumerate() {
-            for &(i, _) in active {
-                given.u[shape.offsets[t] + i] = 0.0;
-            }
+        for held in held {
+            given.u[held.index] = 0.0;
         }
         system.solve(given, solution)?;
-        for (own, eta) in x0.iter_mut().zip(&solution.dynamics) {
-            *own = -eta;
-        }
-        for (t, active) in point.controls.iter().enumerate() {
-            if active.is_empty() {
-                continue;
-            }
-            let knot = &point.knots[t];
-            let (xi, u) = (slice(&solution.x[shape.dx(t)]), slice(&solution.u[shape.u(t)]));
-            let eta = slice(&solution.dynamics[shape.dx(t + 1)]);
-            for (k, &(i, _)) in active.iter().enumerate() {
-                // κ = Sᵀξ + Rυ + Bᵀη⁺ + Dᵀγ − ∂L/∂u
-                let terms = knot.S.column(i).dot(&xi) + knot.R.column(i).dot(&u) + knot.B.column(i).dot(&eta);
-                let rows = point.rows[t].D.column(i).dot(&solution.rows[t]);
-                let by_bound = terms + rows - by_controls[shape.offsets[t] + i];
-                kappa[t][k] = by_bound;
-                control_bounds[shape.offsets[t] + i] = -by_bound;
-            }
-        }
+        self.write_bounds(by_controls);
         for (t, Rows { active, .. }) in point.rows.iter().enumerate() {
             for (k, (row, _)) in active.iter().enumerate() {
-                row_bounds[t][*row] = solution.rows[t][k];
+                self.row_bounds[t][*row] = self.solution.rows[t][k];
             }
         }
         Ok(())
+    }
+
+    /// Computes the derivatives with respect to the initial state and to the bounds of controls from ξ, υ, η and γ.
+    pub(super) fn write_bounds(&mut self, by_controls: &[f64]) {
+        let Self { x0, control_bounds, shape, solution, held, kappa, .. } = self;
+        for (own, eta) in x0.iter_mut().zip(&solution.dynamics) {
+            *own = -eta;
+        }
+        let (mut t, mut k) = (0, 0); // knot, and index among its controls at a bound
+        for Held { knot, index, S, R, B, D } in held {
+            k = if *knot == t { k } else { 0 };
+            t = *knot;
+            let (xi, u) = (slice(&solution.x[shape.dx(t)]), slice(&solution.u[shape.u(t)]));
+            let eta = slice(&solution.dynamics[shape.dx(t + 1)]);
+            // κ = Sᵀξ + Rυ + Bᵀη⁺ + Dᵀγ − ∂L/∂u
+            let terms = S.dot(&xi) + R.dot(&u) + B.dot(&eta) + D.dot(&solution.rows[t]);
+            kappa[t][k] = terms - by_controls[*index];
+            control_bounds[*index] = -kappa[t][k];
+            k += 1;
+        }
     }
 
     /// Returns dL/dp for a parameter. Allocates the result.
@@ -127,6 +173,16 @@ impl Adjoint {
             self.add_knot(parameter, t, &mut sum);
         }
         sum
+    }
+
+    /// Returns dL/dp for each of several parameters, from the same solution of the adjoint problem. Allocates the
+    /// result.
+    ///
+    /// # Panics
+    /// If a Jacobian belongs to a solution with other dimensions or other active constraints.
+    #[track_caller]
+    pub fn gradients<'a>(&self, parameters: impl IntoIterator<Item = &'a ParameterJacobian>) -> Vec<Vec<f64>> {
+        parameters.into_iter().map(|parameter| self.gradient(parameter)).collect()
     }
 
     /// Returns the part of dL/dp for each knot 0 … N: the derivative with respect to a value of the parameter that only

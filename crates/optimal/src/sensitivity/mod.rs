@@ -8,6 +8,8 @@
 mod adjoint;
 mod curvature;
 mod forward;
+mod lanes;
+mod many;
 mod parameters;
 mod point;
 mod report;
@@ -15,6 +17,7 @@ mod system;
 
 pub use adjoint::Adjoint;
 pub use forward::SolutionJacobian;
+pub use many::Sensitivities;
 pub use parameters::{Parameter, ParameterJacobian};
 pub use report::{Curvature, SensitivityReport, SensitivitySettings, WeakestBound};
 
@@ -96,6 +99,9 @@ impl Sensitivity {
     ) -> Result<Self, Error> {
         settings.check()?;
         problem.shape().check(solution.shape())?;
+        if solution.is_empty() {
+            return Err(wrong("the solver has not solved the problem yet"));
+        }
         if solution.status != Status::Converged {
             return Err(wrong(format!("the solution {}, expected one that converged", solution.status)));
         }
@@ -109,6 +115,15 @@ impl Sensitivity {
         let system = System::new(&point)?;
         let adjoint = Adjoint::new(&point);
         Ok(Self { settings, report, point, system, adjoint })
+    }
+
+    /// Returns `Ok` if a problem is still the one of this solution. One evaluation of the problem. Allocates.
+    ///
+    /// # Errors
+    /// [`Error::Sensitivity`] if the initial state, a cost or the dynamics have changed; [`Error::Length`] or
+    /// [`Error::Dimension`] for a problem with other dimensions.
+    pub fn check_problem(&self, problem: &mut Problem) -> Result<(), Error> {
+        self.point.check_problem(problem)
     }
 
     /// Returns the report: residuals of the optimality conditions, active bounds, and strict complementarity.
@@ -150,11 +165,13 @@ impl Sensitivity {
 
     /// Returns the derivatives of the optimality conditions with respect to `size` parameters of one's own. `build`
     /// returns the problem for a change of these parameters from `problem`. Any number may thus be a parameter, such as
-    /// the inertia of a body. `build` is called twice for each parameter, with a change of ±`step`. The derivatives are
-    /// central differences. Allocates.
+    /// the inertia of a body. `build` is called without a change first, and then twice for each parameter, with a
+    /// change of ±`step`. The derivatives are central differences. Allocates.
     ///
     /// # Errors
-    /// The errors of `build`; [`Error::Dimension`] or [`Error::Length`] if a problem has other dimensions.
+    /// The errors of `build`; [`Error::Sensitivity`] if the problem without a change has other costs or other next
+    /// states at the solution than the solved one; [`Error::Dimension`] or [`Error::Length`] if a problem has other
+    /// dimensions.
     pub fn jacobian_of(
         &self,
         problem: &Problem,

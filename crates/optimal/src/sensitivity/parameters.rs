@@ -141,17 +141,19 @@ pub struct ParameterJacobian {
     knots: Vec<Option<KnotJacobian>>,
 }
 
-/// Derivatives of one knot with respect to a parameter, with a column for each entry.
+/// Derivatives of one knot with respect to a parameter, with a column for each entry; `None` for zeros.
 #[derive(Debug, Clone)]
 struct KnotJacobian {
     /// Derivatives of ∇Lₜ, ndx + nu rows.
-    gradient: DMatrix<f64>,
+    gradient: Option<DMatrix<f64>>,
     /// Derivatives of φₜ, ndx rows; empty at the terminal knot.
-    next: DMatrix<f64>,
+    next: Option<DMatrix<f64>>,
     /// Derivatives of the active rows minus their bounds.
-    rows: DMatrix<f64>,
+    rows: Option<DMatrix<f64>>,
     /// Derivatives of the active bounds on controls.
-    bounds: DMatrix<f64>,
+    bounds: Option<DMatrix<f64>>,
+    /// Number of active rows, and of active bounds on controls.
+    active: [usize; 2],
 }
 
 impl ParameterJacobian {
@@ -170,24 +172,24 @@ impl ParameterJacobian {
     pub(super) fn subtract_products(&self, shape: &Shape, t: usize, adjoint: &Vectors, kappa: &[f64], to: &mut [f64]) {
         let Vectors { x, u, dynamics: eta, rows } = adjoint;
         assert_length("knots of the parameter's Jacobian", self.knots.len(), shape.horizon() + 1);
-        let mut subtract = |J: &DMatrix<f64>, first: usize, numbers: &[f64]| {
-            for (j, to) in to.iter_mut().enumerate() {
-                *to -= J.column(j).rows(first, numbers.len()).dot(&slice(numbers));
+        let mut subtract = |J: Option<&DMatrix<f64>>, first: usize, numbers: &[f64]| {
+            for (to, column) in to.iter_mut().zip(J.iter().flat_map(|J| J.column_iter())) {
+                *to -= column.rows(first, numbers.len()).dot(&slice(numbers));
             }
         };
         if t == 0 {
-            subtract(&self.initial, 0, &eta[shape.dx(0)]);
+            subtract(Some(&self.initial), 0, &eta[shape.dx(0)]);
         }
         let Some(knot) = &self.knots[t] else { return };
-        assert_length("active rows of the parameter's Jacobian", knot.rows.nrows(), rows[t].len());
-        assert_length("active bounds of the parameter's Jacobian", knot.bounds.nrows(), kappa.len());
-        subtract(&knot.gradient, 0, &x[shape.dx(t)]);
-        subtract(&knot.gradient, shape.ndx, &u[shape.u(t)]);
+        assert_length("active rows of the parameter's Jacobian", knot.active[0], rows[t].len());
+        assert_length("active bounds of the parameter's Jacobian", knot.active[1], kappa.len());
+        subtract(knot.gradient.as_ref(), 0, &x[shape.dx(t)]);
+        subtract(knot.gradient.as_ref(), shape.ndx, &u[shape.u(t)]);
         if t < shape.horizon() {
-            subtract(&knot.next, 0, &eta[shape.dx(t + 1)]);
+            subtract(knot.next.as_ref(), 0, &eta[shape.dx(t + 1)]);
         }
-        subtract(&knot.rows, 0, rows[t].as_slice());
-        subtract(&knot.bounds, 0, kappa);
+        subtract(knot.rows.as_ref(), 0, rows[t].as_slice());
+        subtract(knot.bounds.as_ref(), 0, kappa);
     }
 
     /// Writes the right-hand sides of the linearised optimality conditions for entry j. Returns the derivatives of the
@@ -197,16 +199,23 @@ impl ParameterJacobian {
         given.dynamics[..ndx].copy_from_slice(self.initial.column(j).as_slice());
         let write = |(t, knot): (usize, &Option<KnotJacobian>)| {
             let Some(knot) = knot else { return Vec::new() };
-            let column = knot.gradient.column(j);
-            let (by_x, by_u) = column.as_slice().split_at(ndx);
-            let negate = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(to, from)| *to = -from);
-            negate(&mut given.x[shape.dx(t)], by_x);
-            negate(&mut given.u[shape.u(t)], by_u);
-            if t < shape.horizon() {
-                given.dynamics[shape.dx(t + 1)].copy_from_slice(knot.next.column(j).as_slice());
+            if let Some(gradient) = &knot.gradient {
+                let column = gradient.column(j);
+                let (by_x, by_u) = column.as_slice().split_at(ndx);
+                let negate = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(to, from)| *to = -from);
+                negate(&mut given.x[shape.dx(t)], by_x);
+                negate(&mut given.u[shape.u(t)], by_u);
             }
-            given.rows[t].copy_from(&knot.rows.column(j));
-            knot.bounds.column(j).iter().copied().collect()
+            if let Some(next) = &knot.next {
+                given.dynamics[shape.dx(t + 1)].copy_from_slice(next.column(j).as_slice());
+            }
+            if let Some(rows) = &knot.rows {
+                given.rows[t].copy_from(&rows.column(j));
+            }
+            match &knot.bounds {
+                Some(bounds) => bounds.column(j).iter().copied().collect(),
+                None => vec![0.0; knot.active[1]],
+            }
         };
         self.knots.iter().enumerate().map(write).collect()
     }
@@ -226,7 +235,7 @@ impl Conditions {
     fn new(point: &Point, problem: &mut Problem) -> Self {
         let mut knots = problem.lq_knots();
         let gradients = point.gradients(problem, [&point.xs, &point.us], &mut knots);
-        let gaps = point.gaps(problem);
+        let (gaps, _) = point.values(problem);
         let row = |[c, lower, upper]: [f64; 3], side: bool| c - if side { upper } else { lower };
         let rows = point.rows.iter().zip(&knots).map(|(rows, knot)| {
             let all: Vec<[f64; 3]> = knot.rows.bounds().collect();
@@ -304,31 +313,33 @@ impl<'a> Differences<'a> {
         };
         initial.column_mut(j).copy_from(&slope(&above.gaps, &below.gaps, 0));
         for (t, knot) in knots.iter_mut().enumerate() {
-            let [gradient, next, rows, bounds] = [
-                slope(&above.gradients, &below.gradients, t),
-                slope(&above.gaps, &below.gaps, t + 1),
-                slope(&above.rows, &below.rows, t),
-                slope(&above.bounds, &below.bounds, t),
-            ];
-            let is_zero = [&gradient, &next, &rows, &bounds].into_iter().all(|part| part.iter().all(|x| *x == 0.0));
-            if is_zero {
+            let mut gradient = slope(&above.gradients, &below.gradients, t);
+            if let Some(bracket) = brackets.get(t) {
+                let lq = &point.knots[t];
+                gradient.rows_mut(0, lq.ndx()).gemv_tr(1.0, &lq.A, bracket, 1.0);
+                gradient.rows_mut(lq.ndx(), lq.nu()).gemv_tr(1.0, &lq.B, bracket, 1.0);
+            }
+            let next = slope(&above.gaps, &below.gaps, t + 1);
+            let (rows, bounds) = (slope(&above.rows, &below.rows, t), slope(&above.bounds, &below.bounds, t));
+            let is_zero = |column: &DVector<f64>| column.iter().all(|x| *x == 0.0);
+            let all = [&gradient, &next, &rows, &bounds];
+            if knot.is_none() && all.into_iter().all(is_zero) {
                 continue;
             }
+            let active = [rows.len(), bounds.len()];
             let knot = knot.get_or_insert_with(|| KnotJacobian {
-                gradient: zeros(point.shape.ndx + point.shape.nu(t)),
-                next: zeros(next.len()),
-                rows: zeros(rows.len()),
-                bounds: zeros(bounds.len()),
+                gradient: None,
+                next: None,
+                rows: None,
+                bounds: None,
+                active,
             });
-            knot.gradient.column_mut(j).copy_from(&gradient);
-            if let Some(bracket) = brackets.get(t) {
-                let (lq, mut column) = (&point.knots[t], knot.gradient.column_mut(j));
-                column.rows_mut(0, lq.ndx()).gemv_tr(1.0, &lq.A, bracket, 1.0);
-                column.rows_mut(lq.ndx(), lq.nu()).gemv_tr(1.0, &lq.B, bracket, 1.0);
+            let KnotJacobian { gradient: G, next: N, rows: R, bounds: B, .. } = knot;
+            for (matrix, column) in [G, N, R, B].into_iter().zip(all) {
+                if matrix.is_some() || !is_zero(column) {
+                    matrix.get_or_insert_with(|| zeros(column.len())).column_mut(j).copy_from(column);
+                }
             }
-            knot.next.column_mut(j).copy_from(&next);
-            knot.rows.column_mut(j).copy_from(&rows);
-            knot.bounds.column_mut(j).copy_from(&bounds);
         }
     }
 }
@@ -371,6 +382,9 @@ fn write_all(nudge: &Nudge, problem: &mut Problem, differences: &mut Differences
     Ok(())
 }
 
+/// Largest relative difference of costs and states of a problem that is built again: rounding errors.
+const SAME: f64 = 1e-6;
+
 /// Function that evaluates a problem.
 pub(super) type Evaluate<'a> = &'a mut dyn FnMut(&mut Problem) -> Result<(), Error>;
 
@@ -389,6 +403,12 @@ pub(super) fn jacobian_with(
     problem.shape().check(&point.shape)?;
     let mut differences = Differences::new(point, size, problem);
     let mut change = vec![0.0; size];
+    build(&change, &mut |problem| {
+        problem.shape().check(&point.shape)?;
+        point.check_values(problem, SAME, &mut |what| {
+            wrong(format!("the problem that is built without a change is another one than the solved problem: {what}"))
+        })
+    })?;
     for j in 0..size {
         let mut conditions = |h: f64| {
             let mut found = None;

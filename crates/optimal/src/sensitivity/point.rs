@@ -48,8 +48,10 @@ pub(super) struct Point {
     pub rows: Vec<Rows>,
     /// Controls at a bound, for each knot in ascending order.
     pub controls: Vec<Vec<Active>>,
-    /// Gradients ∇Lₜ of the problem for which the solution was computed.
+    /// Gradients ∇Lₜ of the problem for which the solution was computed, its gaps, and its costs.
     gradients: Vec<DVector<f64>>,
+    gaps: Vec<DVector<f64>>,
+    costs: Vec<f64>,
 }
 
 impl Point {
@@ -75,6 +77,8 @@ impl Point {
             xs: solution.xs.clone(),
             us: solution.us.clone(),
             gradients: Vec::new(),
+            gaps: Vec::new(),
+            costs: Vec::new(),
             shape,
             knots,
         };
@@ -96,7 +100,8 @@ impl Point {
         }
         point.gradients = point.gradients_of(&point.knots);
         point.knots.iter_mut().for_each(|knot| knot.rows.clear());
-        report.primal = report.primal.max(point.largest_gap(problem));
+        (point.gaps, point.costs) = point.values(problem);
+        report.primal = point.gaps.iter().fold(report.primal, |largest, gap| larger(largest, gap.amax()));
         report.active_controls = point.controls.iter().map(Vec::len).sum();
         report.active_rows = point.rows.iter().map(|rows| rows.active.len()).sum();
         report.strict_complementarity = report.margin >= settings.strictness;
@@ -183,13 +188,43 @@ impl Point {
         L_u
     }
 
-    /// Returns the largest gap of the dynamics.
-    fn largest_gap(&self, problem: &mut Problem) -> f64 {
-        self.gaps(problem).iter().fold(0.0, |largest, gap| larger(largest, gap.amax()))
+    /// Returns `Ok` if a problem is the one of this solution: its initial state, gradients and equations.
+    pub(super) fn check_problem(&self, problem: &mut Problem) -> Result<(), Error> {
+        problem.shape().check(&self.shape)?;
+        let mut knots = problem.lq_knots();
+        let found = self.gradients(problem, [&self.xs, &self.us], &mut knots);
+        self.check_gradients(&found)?;
+        self.check_values(problem, UNCHANGED, &mut |what| {
+            wrong(format!("{what}: the problem has changed since the sensitivity was created"))
+        })
     }
 
-    /// Returns x̂₀ ⊖ x₀, and the gaps φₜ(xₜ, uₜ) ⊖ xₜ₊₁ of all knots.
-    pub(super) fn gaps(&self, problem: &mut Problem) -> Vec<DVector<f64>> {
+    /// Returns `Ok` if gaps and costs of a problem are the ones of this solution, up to a relative error.
+    pub(super) fn check_values(
+        &self,
+        problem: &mut Problem,
+        tolerance: f64,
+        error: &mut dyn FnMut(String) -> Error,
+    ) -> Result<(), Error> {
+        let (gaps, costs) = self.values(problem);
+        for (t, (own, found)) in self.costs.iter().zip(&costs).enumerate() {
+            let distance = (own - found).abs();
+            if distance.is_nan() || distance > tolerance * (1.0 + own.abs()) {
+                return Err(error(format!("the cost of knot {t} is {found:.9e}, expected {own:.9e}")));
+            }
+        }
+        for (t, (own, found)) in self.gaps.iter().zip(&gaps).enumerate() {
+            let (scale, distance) = (1.0 + own.amax(), (own - found).amax());
+            if distance.is_nan() || distance > tolerance * scale {
+                let what = if t == 0 { "initial state".to_owned() } else { format!("next state of knot {}", t - 1) };
+                return Err(error(format!("the {what} differs by {distance:.3e}")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the gaps x̂₀ ⊖ x₀ and φₜ(xₜ, uₜ) ⊖ xₜ₊₁ of all knots, and the costs.
+    pub(super) fn values(&self, problem: &mut Problem) -> (Vec<DVector<f64>>, Vec<f64>) {
         let (nx, ndx, horizon) = (self.shape.nx, self.shape.ndx, self.shape.horizon());
         let (mut next, mut costs) = (vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
         problem.calc(&self.xs, &self.us, &mut next, &mut costs);
@@ -200,7 +235,7 @@ impl Point {
             problem.difference(x, predicted, gap.as_mut_slice());
             gap
         };
-        pairs.map(gap).collect()
+        (pairs.map(gap).collect(), costs)
     }
 
     /// Computes the gradients ∇Lₜ = (q + Aᵀλ⁺ + Cᵀy, r + Bᵀλ⁺ + Dᵀy) of all knots of a problem at (`xs`, `us`), with

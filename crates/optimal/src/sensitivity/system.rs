@@ -31,17 +31,17 @@ const CONTRADICTION: f64 = 1e-7;
 
 /// Knot of the system, without its controls at a bound.
 #[derive(Debug, Clone)]
-struct KnotFactor {
-    A: DMatrix<f64>,
-    B: DMatrix<f64>,
+pub(super) struct KnotFactor {
+    pub A: DMatrix<f64>,
+    pub B: DMatrix<f64>,
     C: DMatrix<f64>,
     D: DMatrix<f64>,
     /// Weight ρ of each active row.
     rho: DVector<f64>,
     /// Gain K, Cholesky factor of Quu, and Hessian of the value function, from the sweep.
-    K: DMatrix<f64>,
-    L: DMatrix<f64>,
-    P: DMatrix<f64>,
+    pub K: DMatrix<f64>,
+    pub L: DMatrix<f64>,
+    pub P: DMatrix<f64>,
 }
 
 /// Factors of the linearised optimality conditions, with the vectors of one solution.
@@ -109,6 +109,11 @@ impl System {
         }
         let (shape, effective) = (point.shape.clone(), Vectors::zeros(point));
         Ok(Self { knots, shape, p: effective.x.clone(), k: effective.u.clone(), effective })
+    }
+
+    /// Returns the factors of all knots.
+    pub(super) fn factors(&self) -> &[KnotFactor] {
+        &self.knots
     }
 
     /// Returns the gain of the first knot.

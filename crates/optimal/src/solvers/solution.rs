@@ -243,6 +243,11 @@ impl Solution {
         }
     }
 
+    /// Returns whether the problem has not been solved yet.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.status == Status::MaxIterations && self.trace.is_empty() && self.timings.total.is_zero()
+    }
+
     /// Returns the state xₜ, t = 0 … N.
     ///
     /// # Panics

@@ -4,7 +4,8 @@ use super::{DIFFERENCES, Family, Loss, check_within};
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
 use condyle_optimal::{
-    AugmentedLagrangian, ConstraintSettings, InteriorPoint, Problem, Sensitivity, SensitivitySettings, Solution, Status,
+    AugmentedLagrangian, ConstraintSettings, InteriorPoint, ParameterJacobian, Problem, Sensitivity,
+    SensitivitySettings, Solution, Status,
 };
 use std::sync::Arc;
 
@@ -51,6 +52,16 @@ fn augmented_lagrangian(problem: &mut Problem, xs: &[f64], us: &[f64]) -> (Solut
     let outcome = solver.outcome();
     assert_eq!(solution.status, Status::Converged, "{:e} {:e}", outcome.primal, outcome.dual);
     (solution, solver)
+}
+
+/// Solves the arm by the augmented Lagrangian, and linearises it.
+pub(crate) fn solved() -> Vec<(Sensitivity, Vec<ParameterJacobian>)> {
+    let mut problem = arm(&[0.0; 10]);
+    let xs = problem.x0().repeat(16);
+    let us = problem.quasi_static(&xs).unwrap();
+    let (solution, solver) = augmented_lagrangian(&mut problem, &xs, &us);
+    let settings = SensitivitySettings::default();
+    vec![(Sensitivity::new(&mut problem, &solution, Some(solver.outcome()), settings).unwrap(), vec![])]
 }
 
 /// Checks both solvers, with active inequalities and equalities, against differences of solutions of the augmented

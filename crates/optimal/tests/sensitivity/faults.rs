@@ -17,6 +17,8 @@ fn faults_are_named() {
     let near = first_solution(&mut problem);
     let solution = solve_tightly(&mut problem, &near.xs, &near.us, true);
     let settings = SensitivitySettings::default;
+    let unsolved = text(Sensitivity::new(&mut problem, Fddp::new(&arm(&[0.0; 20])).solution(), None, settings()));
+    assert_eq!(unsolved, "sensitivity: the solver has not solved the problem yet");
     let mut short = Fddp::new(&problem);
     short.settings = Settings { max_iterations: 1, ..Settings::default() };
     let unfinished = short.solve(&mut problem, &near.xs, &vec![0.0; near.us.len()]).unwrap().clone();
@@ -36,6 +38,24 @@ fn faults_are_named() {
     let length = sensitivity.adjoint(&[0.0; 3], &[0.0; 105]).unwrap_err().to_string();
     assert_eq!(length, "`by_states`: expected length 224, found 3");
 
+    let change = |entry: usize, by: f64| {
+        let mut p = [0.0; 20];
+        p[entry] = by;
+        sensitivity.jacobian_of(&problem, 1, 1e-5, |_| Ok(arm(&p))).unwrap_err().to_string()
+    };
+    let start = "sensitivity: the problem that is built without a change is another one than the solved problem: ";
+    let [cost, state] = [change(17, 0.1), change(0, 0.1)];
+    assert!(cost.starts_with(&format!("{start}the cost of knot 0 is ")), "{cost}");
+    assert_eq!(state, format!("{start}the initial state differs by 1.000e-1"));
+
+    sensitivity.check_problem(&mut problem).unwrap();
+    problem.parameter(&Parameter::Duration).unwrap(); // a reader changes nothing
+    sensitivity.check_problem(&mut problem).unwrap();
+    let x0 = problem.x0().to_vec();
+    problem.set_x0(&[0.2; 14]).unwrap();
+    let moved = sensitivity.check_problem(&mut problem).unwrap_err().to_string();
+    assert!(moved.ends_with(": the problem has changed since the sensitivity was created"), "{moved}");
+    problem.set_x0(&x0).unwrap();
     problem.cost_mut(0, "reach").unwrap().set_weight(40.0).unwrap();
     let late = sensitivity.jacobian(&mut problem, &"target/reach".parse().unwrap()).unwrap_err().to_string();
     assert_eq!(late, "sensitivity: knot 0 of the problem has changed since the sensitivity was created");

@@ -72,6 +72,8 @@ pub struct Problem {
     unread: Vec<f64>,
     /// Scratch of predictions.
     scratch: Vec<f64>,
+    /// Number of calls that may have changed the problem.
+    revision: u64,
 }
 
 impl Problem {
@@ -100,8 +102,9 @@ impl Problem {
         let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
         share(&*models.actions[0], &mut *terminal);
         reserve(&mut *terminal);
+        let (scratch, revision) = (Vec::new(), 0);
         let mut problem =
-            Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread, scratch: Vec::new() };
+            Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread, scratch, revision };
         problem.arrange();
         Ok(problem)
     }
@@ -109,6 +112,7 @@ impl Problem {
     /// Computes the offsets of the controls, and the runs of consecutive knots with the same action, from
     /// `knot_models`.
     fn arrange(&mut self) {
+        self.mark_changed();
         let Self { models, knot_models, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
         offsets.clear();
@@ -273,6 +277,7 @@ impl Problem {
     /// then kept.
     pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
         self.check_x0(x0)?;
+        self.mark_changed();
         self.x0.copy_from_slice(x0);
         Ok(())
     }
@@ -293,6 +298,7 @@ impl Problem {
 
     /// Returns the action that represents model `index`. Later changes of the action affect only this model.
     pub(crate) fn chosen(&mut self, index: usize) -> Option<&mut dyn ActionModel> {
+        self.mark_changed();
         if index < self.models.len() {
             self.copies.forget(self.models.place(index)[0]);
         }
@@ -307,6 +313,7 @@ impl Problem {
         t: usize,
         visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
     ) -> Result<(), E> {
+        self.mark_changed();
         let Some(&index) = self.knot_models.get(t) else { return visit(&mut *self.terminal) };
         let [action, own] = self.models.place(index);
         visit(self.models.chosen(index).expect("a knot has an existing model"))?;
@@ -319,11 +326,24 @@ impl Problem {
         &mut self,
         visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
     ) -> Result<(), E> {
+        self.mark_changed();
         for (k, action) in self.models.actions.iter_mut().enumerate() {
             visit(&mut **action)?;
             self.copies.each_of(k, 0, visit)?;
         }
         visit(&mut *self.terminal)
+    }
+
+    /// Counts a call that may change the problem.
+    pub(crate) fn mark_changed(&mut self) {
+        self.revision += 1;
+    }
+
+    /// Returns the number of calls that may have changed the problem. If the number is the same as before, so is the
+    /// problem, except for actions of one's own that change by themselves.
+    #[doc(hidden)]
+    pub fn revision(&self) -> u64 {
+        self.revision
     }
 
     /// Returns the number of models.
@@ -361,11 +381,13 @@ impl Problem {
         let mut runs = Vec::with_capacity(knot_models.len()); // `shift` may need this capacity and must not allocate
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
-        Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread, scratch: Vec::new() })
+        let (scratch, revision) = (Vec::new(), 0);
+        Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread, scratch, revision })
     }
 
     /// Returns the terminal model as a `T`, if it has that type.
     pub fn terminal_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
+        self.mark_changed();
         let model: &mut dyn Any = self.terminal.as_mut();
         model.downcast_mut()
     }
