@@ -107,8 +107,9 @@ pub use sensitivity::{
 };
 pub use solvers::{
     AugmentedLagrangian, BatchFddp, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint,
-    InteriorPointSettings, Iteration, LimitRows, ManyProblems, Observer, Outcome, PlanPoint, Policy, PolicyPoint,
-    PolicyPublisher, Settings, Solution, StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
+    InteriorPointSettings, Iteration, LimitRows, ManyProblems, Observer, OneByOne, Outcome, PlanPoint, Policy,
+    PolicyPoint, PolicyPublisher, Settings, SingleSolver, Solution, StateSpace, Status, Timings, Verdict, Violation,
+    ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

@@ -1,7 +1,7 @@
 //! Many problems solved together in lanes: the results equal single solves, whichever problems share the lanes.
 #![allow(non_snake_case)] // names follow the literature: K
 
-use condyle_dynamics::{ContactConstraint, Model, Vec3, neutral, robots};
+use condyle_dynamics::{ContactConstraint, Data, Model, Se3, Target, Vec3, forward_kinematics, lie, neutral, robots};
 use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, ImpulseDynamics, Residual};
 use condyle_optimal::{BatchFddp, Error, Fddp, ManyProblems, Problem, Settings, Solution, Status, Unicycle};
 use std::ops::ControlFlow;
@@ -152,11 +152,18 @@ fn bent(model: &Model) -> Vec<f64> {
     [q, vec![0.0; 18]].concat()
 }
 
-/// Six knots on two feet, an impact, and six knots on four feet.
-fn gait() -> Problem {
+/// Six knots on two feet, an impact, and six knots on four feet. If the gain `kp` of the contacts' positions is not 0,
+/// the orientation of one foot is also held.
+fn gait(kp: f64) -> Problem {
     let model = Arc::new(robots::quadruped());
     let x0 = bent(&model);
-    let foot = |name: &str| ContactConstraint { kd: 20.0, ..ContactConstraint::point(model.frame(name).unwrap()) };
+    let foot = |name: &str| {
+        let frame = model.frame(name).unwrap();
+        let rigid = kp > 0.0 && name == "LF_foot";
+        let constraint = if rigid { ContactConstraint::rigid(frame) } else { ContactConstraint::point(frame) };
+        let target = Target { placement: placement(&model, name), ..Target::identity() };
+        ContactConstraint { kp, kd: 20.0, target, ..constraint }
+    };
     let contacts = |names: &[&str]| names.iter().map(|name| Contact::new(name, foot(name))).collect::<Vec<_>>();
     let costs = || {
         vec![
@@ -172,6 +179,30 @@ fn gait() -> Problem {
     let end = FreeDynamics::terminal(model, vec![costs().swap_remove(0), costs().swap_remove(2)]).unwrap();
     let knots = [vec![0; 6], vec![1], vec![2; 6]].concat();
     Problem::new(x0, vec![Box::new(two), Box::new(impact), Box::new(stance)], knots, Box::new(end)).unwrap()
+}
+
+/// Returns the placement of a foot in the first state of the gait.
+fn placement(model: &Model, name: &str) -> Se3<f64> {
+    forward_kinematics(model, &mut Data::new(model), &bent(model)[..19]).frame(model.frame(name).unwrap())
+}
+
+/// Changes a problem as `vary_gait` does, and the targets of two contacts.
+fn aim_gait(i: usize, problem: &mut Problem) -> Result<(), Error> {
+    vary_gait(i, problem)?;
+    let wave = |k: usize| ((i * 11 + k * 3) as f64).sin();
+    let model = robots::quadruped();
+    let turn = Se3::new(lie::exp3(Vec3::new(0.1 * wave(1), 0.1 * wave(2), 0.1 * wave(3))).to_rotation(), Vec3::zero());
+    let first = problem.change_contacts("LF_foot", |contact| {
+        contact.target.placement = placement(&model, "LF_foot") * turn;
+        contact.target.velocity.linear.x = 0.1 * wave(4);
+        contact.target.velocity.angular.y = 0.1 * wave(5);
+        contact.target.acceleration.linear.z = wave(6);
+    })?;
+    let second = problem.change_contacts("RH_foot", |contact| {
+        contact.target.placement.translation.x = placement(&model, "RH_foot").translation.x + 0.02 * wave(7);
+    })?;
+    assert!(first && second);
+    Ok(())
 }
 
 fn vary_gait(i: usize, problem: &mut Problem) -> Result<(), Error> {
@@ -200,7 +231,12 @@ fn full_ddp() {
 
 #[test]
 fn a_quadruped_with_an_impact() {
-    check(gait(), Settings { max_iterations: 12, ..Settings::default() }, &vary_gait, 1e-9);
+    check(gait(0.0), Settings { max_iterations: 12, ..Settings::default() }, &vary_gait, 1e-9);
+}
+
+#[test]
+fn a_quadruped_whose_contacts_have_other_targets() {
+    check(gait(50.0), Settings { max_iterations: 12, ..Settings::default() }, &aim_gait, 1e-8);
 }
 
 #[test]

@@ -155,7 +155,7 @@ pub trait KnotGroup {
     }
 
     /// Returns whether knot t of this action and of `other` differ only in numbers that may differ between the lanes of
-    /// one batch: durations, weights, targets and bounds.
+    /// one batch: durations, weights, targets, bounds, and targets of contacts.
     fn matches(&self, other: &dyn ActionModel, t: usize) -> bool {
         let _ = (other, t);
         false

@@ -353,6 +353,11 @@ impl AugmentedLagrangian {
         &self.outcome
     }
 
+    /// Sets the gains of the solution to zero, as in a new solver.
+    pub(super) fn forget_gains(&mut self) {
+        self.solver.forget_gains();
+    }
+
     fn run(
         &mut self,
         problem: &mut Problem,

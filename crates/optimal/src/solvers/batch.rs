@@ -1,9 +1,10 @@
 //! Solution of many problems of one shape by FDDP, several at a time in the lanes of SIMD registers.
 
+use super::many::{ManyProblems, spread};
 use super::rollout::{Nominal, SeveralProblems, Trials};
 use super::search::Search;
 use super::settings::Settings;
-use super::solution::{Iteration, Solution, Status};
+use super::solution::{Iteration, Status};
 use super::solver_loop::{Pass, Progress, SolverLoop};
 use super::watch::{Observer, Watch};
 use crate::error::Error;
@@ -11,50 +12,21 @@ use crate::lq::{LqKnot, Sweep};
 use crate::problem::Problem;
 use crate::solvers::fddp::Fddp;
 use crate::time::Instant;
-use condyle_linalg::threads::join;
 use core::ops::ControlFlow;
-use core::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Duration;
-
-/// Minimum time between two calls of [`ManyProblems::go_on`].
-const PERIOD: Duration = Duration::from_millis(10);
-
-/// Problems that a [`BatchFddp`] solves, and the receiver of their solutions.
-///
-/// The methods are called from several threads, for one problem after the other, in any order.
-pub trait ManyProblems: Sync {
-    /// Error that excludes a problem.
-    type Error: From<Error>;
-
-    /// Prepares problem `i`. `problem` is a copy of the nominal problem, which may have been changed for an earlier
-    /// problem: this method must set everything that differs between problems. `xs` ((N + 1)·nx) and `us` contain the
-    /// nominal warm start, which this method may change.
-    ///
-    /// # Errors
-    /// An error that excludes this problem. It is passed to [`solved`](Self::solved).
-    fn start(&self, i: usize, problem: &mut Problem, xs: &mut [f64], us: &mut [f64]) -> Result<(), Self::Error>;
-
-    /// Receives the solution of problem `i`, or the error that excluded it. `problem` is as `start` left it, and is
-    /// used for a later problem.
-    fn solved(&self, i: usize, problem: &mut Problem, result: Result<&Solution, Self::Error>);
-
-    /// Returns whether to continue. This method is called at most every 10 ms on each thread.
-    fn go_on(&self) -> ControlFlow<()> {
-        ControlFlow::Continue(())
-    }
-}
 
 /// Solver of many problems that have the same shape: the same numbers of knots, states and controls, and the same kinds
-/// of dynamics and costs. The problems may differ in initial states, targets, weights, bounds and durations.
+/// of dynamics and costs. The problems may differ in initial states, targets, weights, bounds, durations, and in the
+/// targets of contacts.
 ///
 /// As many problems as a SIMD register has lanes are solved together. Each problem has its own iterations of [`Fddp`]:
 /// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. A
 /// problem that has ended is replaced by the next one. Each thread solves its own problems.
 ///
 /// The result of a problem does not depend on the other problems, to the bit. It differs from the result of [`Fddp`] by
-/// rounding at most, because [`Fddp`] rolls out a single trial by another algorithm. If a problem has other dynamics or
-/// other kinds of costs than the nominal problem, it is solved alone, by [`Fddp`]. The same holds for different contact
-/// placements.
+/// rounding at most, because [`Fddp`] rolls out a single trial by another algorithm.
+///
+/// A problem with another robot model, such as other inertial parameters, is solved alone, by [`Fddp`]. The same holds
+/// for other frames, kinds or gains of contacts, and for other kinds of costs and limits.
 ///
 /// ```
 /// use condyle_optimal::{BatchFddp, Error, LqKnot, Lqr, ManyProblems, Problem, Solution};
@@ -134,17 +106,7 @@ struct Task {
     tried: usize,
 }
 
-/// Distribution of the problems of a call among the threads.
-struct Queue<'a, P> {
-    problems: &'a P,
-    settings: &'a Settings,
-    count: usize,
-    next: AtomicUsize,
-    /// Whether the time is over; the next field is whether the receiver of the solutions has ended the call.
-    is_over: AtomicBool,
-    is_interrupted: AtomicBool,
-    begin: Instant,
-}
+type Queue<'a, P> = super::many::Queue<'a, P, Settings>;
 
 /// Observer that lets a solve run to its end.
 struct Unobserved;
@@ -194,58 +156,9 @@ impl BatchFddp {
     pub fn solve(&mut self, count: usize, problems: &impl ManyProblems) -> Result<usize, Error> {
         self.settings.check()?;
         let settings = Settings { threads: 1, segments: 1, time_budget: None, ..self.settings.clone() };
-        let queue = Queue {
-            problems,
-            settings: &settings,
-            count,
-            next: AtomicUsize::new(0),
-            is_over: AtomicBool::new(false),
-            is_interrupted: AtomicBool::new(false),
-            begin: Instant::now(),
-        };
-        spread(&mut self.workers, &queue, self.settings.time_budget);
-        Ok(queue.next.into_inner().min(count))
-    }
-}
-
-/// Lets each worker solve problems of the queue.
-fn spread<P: ManyProblems>(workers: &mut [Worker], queue: &Queue<'_, P>, budget: Option<Duration>) {
-    match workers {
-        [worker] => worker.run(queue, budget),
-        workers => {
-            let (one, other) = workers.split_at_mut(workers.len() / 2);
-            join(|| spread(one, queue, budget), || spread(other, queue, budget));
-        }
-    }
-}
-
-impl<P: ManyProblems> Queue<'_, P> {
-    /// Returns the index of the next problem, unless all problems have started or the call ends early.
-    fn take(&self) -> Option<usize> {
-        if self.is_over.load(Ordering::Relaxed) || self.is_interrupted.load(Ordering::Relaxed) {
-            return None;
-        }
-        let taken = self.next.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |i| (i < self.count).then_some(i + 1));
-        taken.ok()
-    }
-
-    /// Returns the reason to end the call early, if there is one. Calls the observer if `asked` was long ago.
-    fn stops(&self, budget: Option<Duration>, asked: &mut Instant) -> Option<Status> {
-        let now = Instant::now();
-        if budget.is_some_and(|budget| now.duration_since(self.begin) >= budget) {
-            self.is_over.store(true, Ordering::Relaxed);
-        }
-        if now.duration_since(*asked) >= PERIOD {
-            *asked = now;
-            if self.problems.go_on().is_break() {
-                self.is_interrupted.store(true, Ordering::Relaxed);
-            }
-        }
-        match (self.is_interrupted.load(Ordering::Relaxed), self.is_over.load(Ordering::Relaxed)) {
-            (true, _) => Some(Status::Interrupted),
-            (_, true) => Some(Status::TimeLimit),
-            _ => None,
-        }
+        let queue = Queue::new(problems, &settings, count, self.settings.time_budget);
+        spread(&mut self.workers, &|worker: &mut Worker| worker.run(&queue));
+        Ok(queue.taken())
     }
 }
 
@@ -267,10 +180,10 @@ impl Worker {
     }
 
     /// Solves problems until the queue is empty or a reason to stop exists.
-    fn run<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, budget: Option<Duration>) {
+    fn run<P: ManyProblems>(&mut self, queue: &Queue<'_, P>) {
         let mut asked = Instant::now();
         loop {
-            let stop = queue.stops(budget, &mut asked);
+            let stop = queue.stops(&mut asked);
             for k in 0..self.slots.len() {
                 if let Some(status) = stop
                     && let Some(task) = self.slots[k].task.take()

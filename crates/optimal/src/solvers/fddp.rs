@@ -312,6 +312,11 @@ impl Fddp {
         &self.solver.iterate.solution
     }
 
+    /// Sets the gains of the solution to zero, as in a new solver.
+    pub(super) fn forget_gains(&mut self) {
+        self.solver.forget_gains();
+    }
+
     fn run(
         &mut self,
         problem: &mut Problem,

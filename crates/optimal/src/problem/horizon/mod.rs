@@ -498,7 +498,8 @@ impl Problem {
     }
 
     /// Returns whether each knot of both problems can be computed in one batch: the problems have the same shape, and
-    /// differ only in durations, weights, targets and bounds. Actions without groups are always computed one by one.
+    /// differ only in durations, weights, targets, bounds, and targets of contacts. Actions without groups are always
+    /// computed one by one.
     pub(crate) fn matches(&self, other: &Self) -> bool {
         let knot_matches = |t: usize| match (self.action(t).knot_group(), other.action(t).knot_group()) {
             (Some(own), Some(_)) => own.matches(other.action(t), t),

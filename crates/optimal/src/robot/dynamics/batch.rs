@@ -20,8 +20,8 @@ use crate::robot::knot_data::{KnotData, WIDEST, unpack};
 use crate::robot::residuals::gravity_residual::GravityResidual;
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Model, aba, aba_derivatives, constrained_dynamics,
-    constrained_dynamics_derivatives, constrained_equations_at, constrained_inverse_dynamics,
+    ConstraintSet, ContactConstraint, Mat3, Model, Motion, Se3, Target, Vec3, aba, aba_derivatives,
+    constrained_dynamics, constrained_dynamics_derivatives, constrained_equations_at, constrained_inverse_dynamics,
     constrained_inverse_dynamics_derivatives, rnea, rnea_derivatives,
 };
 use condyle_spatial::block::{Block, Real, SimdToken, gather_rows, scatter};
@@ -64,6 +64,31 @@ pub(crate) enum DynamicsKind {
     /// Inverse dynamics in contact: the controls are (q̈, λ) = u; the efforts are τ = M q̈ + h − Jᵀλ. Fields: the
     /// contacts, and the actuation.
     ContactInverse(Vec<Contact>, Actuation),
+}
+
+impl DynamicsKind {
+    /// Returns the contacts of a knot.
+    pub(crate) fn contacts(&self) -> &[Contact] {
+        match self {
+            Self::Contact(contacts, _) | Self::ContactInverse(contacts, _) | Self::Impact { contacts, .. } => contacts,
+            Self::None | Self::Free | Self::Inverse => &[],
+        }
+    }
+
+    /// Returns whether two kinds differ at most in the targets of their contacts.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        let aimed_alike = |to: &Contact, from: &Contact| {
+            let constraint = ContactConstraint { target: from.constraint.target, ..to.constraint };
+            to.name == from.name && constraint == from.constraint
+        };
+        let (own, others) = (self.contacts(), other.contacts());
+        let alike = || own.len() == others.len() && own.iter().zip(others).all(|(to, from)| aimed_alike(to, from));
+        match (self, other) {
+            (Self::Contact(_, own), Self::Contact(_, other)) => own == other && alike(),
+            (Self::ContactInverse(_, own), Self::ContactInverse(_, other)) => own == other && alike(),
+            _ => self == other,
+        }
+    }
 }
 
 /// Group of knots with their states and controls, and the kind of quantities to compute for them.
@@ -172,6 +197,29 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
             set.set_target(k, target.lift()).expect("was checked");
             set.set_gains(k, kp, kp_axes, kd).expect("was checked");
         }
+    }
+
+    /// Sets a target of contact k for each lane. The targets must be valid.
+    pub(crate) fn set_targets(&mut self, k: usize, targets: &[Target<f64>]) {
+        let (Pass::Contact(set, _) | Pass::ContactInverse(set, _)) = &mut self.pass else { return };
+        let numbers = |target: &Target<f64>| -> [Vec3<f64>; 8] {
+            let Target { placement: Se3 { rotation: Mat3 { x, y, z }, translation }, velocity, acceleration } = *target;
+            let (v, a) = (velocity, acceleration);
+            [x, y, z, translation, v.linear, v.angular, a.linear, a.angular]
+        };
+        let mut each = [[0.0; 24]; WIDEST];
+        for (each, target) in each.iter_mut().zip(targets) {
+            for (to, from) in each.chunks_exact_mut(3).zip(numbers(target)) {
+                to.copy_from_slice(&from.to_array());
+            }
+        }
+        let mut lanes = [S::zero(); 24];
+        pack(targets.len(), |lane| &each[lane][..], &mut lanes);
+        let vector = |i: usize| Vec3::new(lanes[3 * i], lanes[3 * i + 1], lanes[3 * i + 2]);
+        let [x, y, z, translation] = [0, 1, 2, 3].map(vector);
+        let [velocity, acceleration] = [4, 6].map(|i| Motion::new(vector(i), vector(i + 1)));
+        let placement = Se3::new(Mat3 { x, y, z }, translation);
+        set.set_target(k, Target { placement, velocity, acceleration }).expect("was checked");
     }
 
     /// Allocates the workspace for the equations of knots in inverse-dynamics form.

@@ -4,6 +4,7 @@
 mod across;
 mod curvature;
 
+use self::across::aimed;
 use super::batch::{DynamicsKind, Group, KnotBatch, LaneTerms, Long, Short};
 use super::group_kernel::BLOCK;
 use super::impact::Impact;
@@ -20,7 +21,7 @@ use crate::robot::contact::{Contact, SHARED, check_contacts, constraint_set, mov
 use crate::robot::continuous::{Derivatives, KnotInput};
 use crate::robot::costs::Cost;
 use crate::robot::horizon::HorizonTerms;
-use crate::robot::knot_data::{KnotData, KnotState, OnDemand};
+use crate::robot::knot_data::{KnotData, KnotState, OnDemand, WIDEST};
 use crate::robot::outputs::{Capabilities, Output};
 use crate::robot::state::{GroupHessian, groups};
 use crate::{ActionModel, Error};
@@ -66,6 +67,7 @@ struct Parts<'a> {
     model: &'a Arc<Model>,
     actuation: &'a Actuation,
     terms: &'a mut HorizonTerms,
+    kind: &'a DynamicsKind,
     capabilities: &'a Capabilities,
     groups: &'a [Range<usize>],
     work: &'a mut Work,
@@ -315,7 +317,7 @@ impl RobotDynamics {
         let Self { model, actuation, terms, kind, given, capabilities, groups, shared, work } = self;
         terms.reserve();
         let work = work.get(|| Work::new(model, actuation, kind, *given, capabilities, groups, shared));
-        Parts { model, actuation, terms, capabilities, groups, work }
+        Parts { model, actuation, terms, kind, capabilities, groups, work }
     }
 
     /// Uses the memory of `other` for the algorithms of the dynamics, if both robots have the same model and this robot
@@ -372,10 +374,10 @@ impl RobotDynamics {
         self.solve_across(group, &[]);
     }
 
-    /// Computes the dynamics of a group, in one batch if its lanes belong to several robots. `each` has the costs and
-    /// limits of each lane; `None` stands for the costs and limits of this robot. If all lanes belong to this robot,
-    /// `each` is empty.
-    pub(crate) fn solve_across(&mut self, group: Group<'_>, each: &[Option<&HorizonTerms>]) {
+    /// Computes the dynamics of a group, in one batch if its lanes belong to several robots. `each` has the robot of
+    /// each lane, with its costs, limits and contact targets; `None` stands for this robot. If all lanes belong to this
+    /// robot, `each` is empty.
+    pub(crate) fn solve_across(&mut self, group: Group<'_>, each: &[Option<&Self>]) {
         let Group { knots, xs, us, what, durations, .. } = group;
         if let Evaluation::Equations { motions, .. } = what {
             match motions.is_empty() {
@@ -383,8 +385,10 @@ impl RobotDynamics {
                 false => self.set_motions(knots.len(), motions),
             }
         }
-        let Parts { model, actuation, terms, capabilities, work, .. } = self.parts();
-        let terms = LaneTerms { own: terms, each };
+        let Parts { model, actuation, terms, kind, capabilities, work, .. } = self.parts();
+        let mut each_terms: [Option<&HorizonTerms>; WIDEST] = [None; WIDEST];
+        each_terms.iter_mut().zip(each).for_each(|(to, robot)| *to = robot.map(|robot| &robot.terms));
+        let terms = LaneTerms { own: terms, each: &each_terms[..each.len()] };
         let Work { single, vectors, impact, data, .. } = work;
         let (nu, nx, count) = (capabilities.nu, model.nq() + model.nv(), knots.len());
         let alone = |k: usize| {
@@ -409,9 +413,11 @@ impl RobotDynamics {
         let (several, across) = (count > Short::LANES || what != Evaluation::Values, !each.is_empty());
         match vectors.as_mut().filter(|_| count >= WORTHWHILE || equations || across) {
             Some(VectorBatches { long: Some(long), .. }) if several || across => {
-                long.run(model, group, terms, data);
+                aimed(long, kind, each, |long| long.run(model, group, terms, data));
             }
-            Some(VectorBatches { short, .. }) => short.run(model, group, terms, data),
+            Some(VectorBatches { short, .. }) => {
+                aimed(short, kind, each, |short| short.run(model, group, terms, data));
+            }
             None => {
                 for (k, data) in data.chunks_exact_mut(1).enumerate() {
                     single.run(model, alone(k), terms, data);

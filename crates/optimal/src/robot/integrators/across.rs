@@ -5,7 +5,7 @@ use super::accelerations::{ROBOT, robot, robot_mut};
 use crate::problem::{Evaluation, KnotGroup, Results};
 use crate::robot::continuous::{ContinuousModel, KnotInput};
 use crate::robot::dynamics::batch::Group;
-use crate::robot::horizon::HorizonTerms;
+use crate::robot::dynamics::robot::RobotDynamics;
 use crate::robot::knot_data::WIDEST;
 use crate::{ActionModel, GroupModel};
 use std::any::Any;
@@ -27,7 +27,7 @@ impl<M: ContinuousModel> Integrated<M> {
             return false;
         }
         self.set_limits_in_cost(true);
-        let mut each: [Option<&HorizonTerms>; WIDEST] = [None; WIDEST];
+        let mut each: [Option<&RobotDynamics>; WIDEST] = [None; WIDEST];
         for other in &mut *others {
             let other = Self::of_action(&mut **other);
             other.set_limits_in_cost(true);
@@ -35,7 +35,7 @@ impl<M: ContinuousModel> Integrated<M> {
         }
         for (each, &k) in each.iter_mut().zip(of).filter(|(_, k)| **k > 0) {
             let other: &dyn Any = &*others[k - 1];
-            *each = other.downcast_ref::<Self>().and_then(|other| Some(&robot(&other.inner)?.terms));
+            *each = other.downcast_ref::<Self>().and_then(|other| robot(&other.inner));
         }
         let group =
             Group { knots: &[t; WIDEST][..count], xs, us, what: Evaluation::Values, limited: true, durations: &[] };

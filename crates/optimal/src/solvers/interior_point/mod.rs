@@ -373,6 +373,11 @@ impl InteriorPoint {
         &self.outcome
     }
 
+    /// Sets the gains of the solution to zero, as in a new solver.
+    pub(in crate::solvers) fn forget_gains(&mut self) {
+        self.solver.forget_gains();
+    }
+
     fn run(
         &mut self,
         problem: &mut Problem,
