@@ -21,7 +21,7 @@ def described(value: Any) -> str:
         return f"the class {value.__name__}"
     shape = getattr(value, "shape", None)
     if isinstance(shape, tuple):
-        return f"the shape {tuple(shape)}"
+        return f"an array of the shape {tuple(shape)}"
     name = type(value).__name__
     article = "an" if name[0].lower() in "aeio" else "a"
     return f"{article} {name}"

@@ -118,7 +118,10 @@ def start_of(problem: Problem, start: Any, solver: Solver, settings: dict[str, A
         return start.xs, start.us
     if start is not None:
         if isinstance(start, Variations) or not (isinstance(start, (tuple, list)) and len(start) == 2):
-            raise TypeError(f"start: expected a Solution, or states and controls (xs, us), found {described(start)}")
+            hint = ": solve_many takes a start for each problem" if isinstance(start, Variations) else ""
+            raise TypeError(
+                f"start: expected a Solution, or states and controls (xs, us), found {described(start)}{hint}"
+            )
         xs, us = start
         states = reals("start: xs", xs)
         wanted = (problem.horizon + 1, problem.nx)

@@ -213,16 +213,20 @@ def test_time_ends_a_call() -> None:
     assert np.isnan(found.cost[-1])
 
 
-def test_progress_and_its_exceptions() -> None:
+@pytest.mark.parametrize("solver", [Fddp, InteriorPoint, AugmentedLagrangian])
+def test_progress_and_its_exceptions(solver: Any) -> None:
     told: list[tuple[int, int]] = []
-    solve_many(reach(), np.tile(REST, (50, 1)), start=held(), progress=lambda *now: told.append(now))
-    assert told[-1] == (50, 50)
+    solve_many(reach(), np.tile(REST, (20, 1)), start=held(), solver=solver, progress=lambda *now: told.append(now))
+    assert told[-1] == (20, 20)
+    calls: list[int] = []
 
-    def fail(_: int, __: int) -> None:
+    def fail(done: int, _: int) -> None:
+        calls.append(done)
         raise RuntimeError("no more")
 
     with pytest.raises(RuntimeError, match="no more"):
-        solve_many(reach(), np.tile(REST, (50, 1)), start=held(), progress=fail)
+        solve_many(reach(), np.tile(REST, (5000, 1)), start=held(), solver=solver, progress=fail)
+    assert len(calls) == 1 and calls[0] < 5000  # the call ends before all problems are solved
 
 
 @pytest.mark.parametrize(
@@ -255,7 +259,7 @@ def test_progress_and_its_exceptions() -> None:
             r"references\['reach'\]: expected \(V, 3\) or \(V, 13, 3\) numbers, found the shape \(2, 4\)",
             {"references": {"reach": np.zeros((2, 4))}},
         ),
-        (TypeError, "references: expected a dict from names to targets, found the shape", {"references": np.ones(3)}),
+        (TypeError, "references: expected a dict from names to targets, found an array", {"references": np.ones(3)}),
         (TypeError, r"references\['reach'\]: expected .* numbers, found None", {"references": {"reach": None}}),
         (TypeError, "weights: expected names as keys, found 3", {"weights": {3: np.ones(2)}}),
         (
@@ -291,7 +295,7 @@ def test_progress_and_its_exceptions() -> None:
         ),
         (
             ValueError,
-            r"start: expected states of the shape \(13, 14\), found the shape \(5, 14\)",
+            r"start: expected states of the shape \(13, 14\), found an array of the shape \(5, 14\)",
             {"x0": np.zeros((2, 14)), "start": (np.zeros((5, 14)), np.zeros((12, 7)))},
         ),
         (
@@ -301,7 +305,7 @@ def test_progress_and_its_exceptions() -> None:
         ),
         (
             ValueError,
-            r"start: expected states of the shape \('V', 13, 14\), found the shape \(2, 5, 14\)",
+            r"start: expected states of the shape \('V', 13, 14\), found an array of the shape \(2, 5, 14\)",
             {"x0": np.zeros((2, 14)), "start": (np.zeros((2, 5, 14)), np.zeros((2, 12, 7)))},
         ),
         (

@@ -88,6 +88,11 @@ def test_parameters_of_the_model_and_weights() -> None:
     found = condyle.sweep(reach(), [1, 2, 3], vary=heavier)
     assert (found.status == "converged").all()
     assert np.all(np.diff(found.cost) > 0.0)  # a heavier robot costs more to move
+    for solver in (InteriorPoint, AugmentedLagrangian):
+        start = Fddp(reach()).solve(np.tile(REST, (13, 1)), reach().quasi_static(np.tile(REST, (13, 1))))
+        found = condyle.sweep(reach(), [1, 2, 3], vary=heavier, start=start, solver=solver)
+        alone = solver(heavier(reach(), 3)).solve(start.xs, start.us)
+        assert found.xs is not None and np.array_equal(found.xs[2], alone.xs)
     found = condyle.sweep(reach(), [1.0, 10.0, 100.0], vary=aimed, start=(np.tile(REST, (13, 1)), np.zeros((12, 7))))
     assert np.all(np.diff(found.cost) > 0.0)
 
@@ -270,7 +275,7 @@ def test_actions_in_python_are_solved_one_by_one() -> None:
         (TypeError, "threads: expected an integer, found None", {"threads": None}),
         (TypeError, "problem: expected a Problem, found None", {"problem": None}),
         (ValueError, "keep: expected some of", {"keep": ["x"]}),
-        (TypeError, "start: expected a Solution, .*, found a Variations", {"start": "variations"}),
+        (TypeError, "start: expected a Solution, .*, found a Variations: solve_many takes", {"start": "variations"}),
     ],
 )
 def test_wrong_arguments_are_named(kind: type[Exception], match: str, arguments: dict[str, Any]) -> None:
