@@ -98,10 +98,9 @@ ARGUMENTS = {
     "ArrayLike | None": """
         _DifferentialIk._step.v0 _DifferentialIk._place.velocity Model.append.placement
         ModelBuilder.append.placement ModelBuilder.merge.placement""",
-    "Fddp": "_solve_many.solver",
     "Sequence[Sensitivity]": "sensitivities",
     "Sequence[str]": "parameters Sensitivities.gradients.by_knot Sensitivity.gradients.by_knot",
-    "tuple[Any, Any]": "_solve_many.start",
+    "tuple[Any, Any] | None": "_solve_many.start",
     "tuple[Callable[..., object], list[Any]] | None": "_solve_many.vary",
     "Callable[[int], object] | None": "_solve_many.report",
     "Model": "model",
@@ -166,6 +165,7 @@ ARGUMENTS = {
     "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
     "bool": """
+        _solve_many.whole
         _DistancePairs._evaluate.gradients _generate.external_forces batch frames mimic progress strict verbose
         weightless_meshes by_knot FrictionCone.inner Unicycle.terminal _lend.versioned rollout_many.gradients
         rollout_many.states""",
@@ -225,7 +225,7 @@ ARGUMENTS = {
     "_Controls": "us by_us",
     "Problem": "problem",
     "Policy": "policy",
-    "AugmentedLagrangian | Fddp | InteriorPoint": "Record.solver Sensitivity.solver",
+    "AugmentedLagrangian | Fddp | InteriorPoint": "Record.solver Sensitivity.solver _solve_many.solver",
     'Literal["exact", "dynamics", "gauss_newton"]': "Sensitivity.curvature",
     "Callable[[_Array], Problem]": "Sensitivity.define.build",
     # functions whose arguments are arrays of floats, or arrays of numbers that carry their derivatives

@@ -74,7 +74,7 @@ Poses, motions, forces: `SE3`, `Motion`, `Force`, `exp3`, `log3`, `exp6`, `log6`
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
-Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, the SIMD level
+Many solves: `sweep`, `sweep_chunks` (`Variations`), in this process or on a Ray cluster; `LEVEL`, the SIMD level
 Modules: `optimal` (FDDP, DDP and their problems), `distances` (between shapes), `ik` (inverse kinematics), `mpc`
     (controllers at a rate), `wholebody` (control), `simulation`, `algebra` (poses, motions, forces), `conventions`
     (other libraries' numbers). Further modules must be imported by name: `casadi`, `pinocchio` (Pinocchio's names of
@@ -178,7 +178,7 @@ from ._condyle import (
 from ._differentiate import gradient, hessian, jacobian
 from ._inertia import Inertia
 from ._load import load
-from ._sweep import Variations, sweep
+from ._sweep import sweep, sweep_chunks
 from ._types import (
     AbaDerivatives,
     AbaHessian,
@@ -208,6 +208,7 @@ from ._types import (
     RneaSecondDerivatives,
     Spring,
 )
+from ._variations import Variations
 from .algebra import SE3, Force, Jexp6, Jlog6, Motion, exp3, exp6, log3, log6
 
 __all__ = [
@@ -352,6 +353,7 @@ __all__ = [
     "static_torque",
     "static_torque_derivative",
     "sweep",
+    "sweep_chunks",
     "transport",
     "wholebody",
 ]

@@ -5247,25 +5247,28 @@ def rollout_many(
     """
 
 def _solve_many(
-    solver: Fddp,
+    solver: AugmentedLagrangian | Fddp | InteriorPoint,
     count: int,
     data: dict[str, Any],
-    start: tuple[Any, Any],
+    start: tuple[Any, Any] | None,
     vary: tuple[Callable[..., object], list[Any]] | None,
     keep: list[str],
     threads: int,
+    whole: bool,
     report: Callable[[int], object] | None,
 ) -> tuple[dict[str, Any], list[tuple[int, BaseException]]]:
     """Solves variations of a problem: see `condyle.optimal.solve_many` and `condyle.sweep`.
 
-    solver: the settings of all solves.
+    solver: an `Fddp`, `InteriorPoint` or `AugmentedLagrangian` of the nominal problem, with the settings of all solves.
     count: the number V of variations.
-    data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name of a cost, numbers) called
-        "references" and "weights", with the numbers of all knots in a row.
-    start: the states and controls from which all variations start.
+    data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name, numbers): "references" and
+        "weights" of costs, with the numbers of all knots in a row; "contacts", placements (V, 3) or (V, 16). Also
+        "xs" and "us", the states and controls of a start for each variation, in a row.
+    start: the states and controls from which all variations start; None if `data` has a start for each variation.
     vary: None, or a function of the problem and an item that changes the problem or returns another one.
     items: the arguments of `vary`.
     keep: the arrays of each solution to keep.
+    whole: whether the time budget of the solver applies to the whole call. If not, it applies to each solve.
     report: None, or a function that is called with the number of variations that have ended.
 
     Returns the columns of `Variations`, without `error`; the status of a variation that did not start is empty. Also

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._types import _repr
+from ._types import short
 
 _Array = NDArray[np.float64]
 
@@ -119,7 +119,7 @@ class Inertia(NamedTuple):
         return type(self)(mass, com, rotational - parallel_axes(mass, com), rotational)
 
 
-setattr(Inertia, "__repr__", _repr)  # noqa: B010 - type checkers do not allow a method to be replaced
+setattr(Inertia, "__repr__", short)  # noqa: B010 - type checkers do not allow a method to be replaced
 Inertia.__module__ = "condyle"
 
 

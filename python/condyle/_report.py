@@ -50,9 +50,12 @@ def _bar(**options: Any) -> Any:
     return tqdm.tqdm(**options)
 
 
-def counter(progress: bool | Callable[[int, int], object], total: int, done: int) -> Callable[[int | None], None]:
+def counter(
+    progress: bool | Callable[[int, Any], object], total: int | None, done: int
+) -> Callable[[int | None], None]:
     """Returns a function that shows the progress of a sweep, as the argument `progress` requests. Call the returned
-    function with the number of newly finished variations, and with None at the end.
+    function with the number of newly finished variations, and with None at the end. `total` is None if the number of
+    variations is unknown.
     """
     bar = _bar(desc="sweep", unit=" variations", total=total, initial=done) if progress is True else None
 
@@ -64,6 +67,6 @@ def counter(progress: bool | Callable[[int, int], object], total: int, done: int
         elif count is not None and callable(progress):
             progress(done, total)
         elif count is not None and progress:
-            print(f"{done} of {total} variations", flush=True)
+            print(f"{done} variations" if total is None else f"{done} of {total} variations", flush=True)
 
     return more

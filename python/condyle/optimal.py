@@ -63,7 +63,7 @@ from ._condyle import (
     WrenchCone,
     rollout_many,
 )
-from ._sweep import solve_many
+from ._many import solve_many
 from ._types import (
     BoundGradients,
     ConstraintRows,

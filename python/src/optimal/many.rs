@@ -1,8 +1,8 @@
-//! Solutions of many problems of one shape, several at a time in SIMD lanes.
+//! Solutions of many problems of one shape, several at a time in SIMD lanes or one by one.
 
-use super::evaluation::controls;
+use super::evaluation::named_controls;
 use super::problem::{Problem, lock};
-use super::solvers::Fddp;
+use super::solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
 use crate::arrays::{matrix, place, writable};
 use crate::exceptions::problem_error;
 use crate::signals::{self, Signals};
@@ -10,10 +10,11 @@ use condyle::optimal as rust;
 use pyo3::exceptions::{PyArithmeticError, PyKeyError, PyLookupError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use rust::{BatchFddp, ManyProblems, Solution};
+use rust::{BatchFddp, ManyProblems, OneByOne, SingleSolver, Solution};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 /// Names of the arrays of a solution that may be kept.
 const ARRAYS: [&str; 4] = ["xs", "us", "K", "k"];
@@ -21,17 +22,21 @@ const ARRAYS: [&str; 4] = ["xs", "us", "K", "k"];
 /// Names of the numbers of each solution that are always kept.
 const NUMBERS: [&str; 3] = ["cost", "gap", "seconds"];
 
+/// Numbers in a placement, a homogeneous matrix row by row.
+const PLACEMENT: usize = 16;
+
 /// Solves variations of a problem: see `condyle.optimal.solve_many` and `condyle.sweep`.
 ///
-/// solver: the settings of all solves.
+/// solver: an `Fddp`, `InteriorPoint` or `AugmentedLagrangian` of the nominal problem, with the settings of all solves.
 /// count: the number V of variations.
-/// data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name of a cost, numbers) called
-///     "references" and "weights", with the numbers of all knots in a row. Also "xs" and "us", with the states and
-///     controls from which each variation starts, the numbers of all knots in a row.
-/// start: the states and controls from which all variations start, unless `data` has their own.
+/// data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name, numbers): "references" and
+///     "weights" of costs, with the numbers of all knots in a row; "contacts", placements (V, 3) or (V, 16). Also
+///     "xs" and "us", the states and controls of a start for each variation, in a row.
+/// start: the states and controls from which all variations start; None if `data` has a start for each variation.
 /// vary: None, or a function of the problem and an item that changes the problem or returns another one.
 /// items: the arguments of `vary`.
 /// keep: the arrays of each solution to keep.
+/// whole: whether the time budget of the solver applies to the whole call. If not, it applies to each solve.
 /// report: None, or a function that is called with the number of variations that have ended.
 ///
 /// Returns the columns of `Variations`, without `error`; the status of a variation that did not start is empty. Also
@@ -39,34 +44,40 @@ const NUMBERS: [&str; 3] = ["cost", "gap", "seconds"];
 #[pyfunction(name = "_solve_many")]
 pub(crate) fn solve_variations<'py>(
     py: Python<'py>,
-    solver: &Bound<'py, Fddp>,
+    solver: &Bound<'py, PyAny>,
     count: usize,
     data: &Bound<'py, PyDict>,
-    start: [Bound<'py, PyAny>; 2],
+    start: Option<[Bound<'py, PyAny>; 2]>,
     vary: Option<(Py<PyAny>, Py<PyList>)>,
     keep: Vec<String>,
     threads: usize,
+    whole: bool,
     report: Option<Py<PyAny>>,
 ) -> PyResult<(Bound<'py, PyDict>, Errors)> {
-    let shell = &solver.get().problem;
-    let problem = shell.get();
+    let shell = Shell::of(solver)?;
+    let problem = shell.problem.get();
     let inner = lock("problem", &problem.inner)?;
     let (horizon, nx, ndx) = (inner.horizon(), inner.nx(), inner.ndx());
-    let [xs, us] = &start;
-    let (xs, us) = (matrix("start xs", xs, [horizon + 1, nx])?.to_vec(), controls(&inner, us)?);
-    let mut batch = BatchFddp::new(&inner, threads.min(count.max(1))).map_err(problem_error)?;
-    batch.settings = lock("solver", &solver.get().solver)?.settings.clone();
-    batch.set_start(&xs, &us).map_err(problem_error)?;
+    let start = match &start {
+        Some([xs, us]) => {
+            let xs = matrix("start: xs", xs, [horizon + 1, nx])?.to_vec();
+            Some([xs, named_controls("start: us", &inner, us)?])
+        }
+        None => None,
+    };
+    let batch = shell.batch(&inner, threads.min(count.max(1)), start, whole)?;
     let gains = (0..horizon).map(|t| inner.nu(t) * ndx).sum();
-    let sizes = [xs.len(), us.len(), gains, us.len()];
+    let controls = inner.control_range(horizon).end;
+    let sizes = [(horizon + 1) * nx, controls, gains, controls];
     drop(inner);
 
-    let x0 = data.get_item("x0")?.map(|x0| matrix("x0", &x0, [count, nx]).map(|x0| x0.to_vec())).transpose()?;
-    let rows_of = |name: &str, size| {
-        data.get_item(name)?.map(|rows| matrix(name, &rows, [count, size]).map(|rows| rows.to_vec())).transpose()
+    let array = |key: &str, argument: &str, size: usize| -> PyResult<Option<Vec<f64>>> {
+        let Some(numbers) = data.get_item(key)? else { return Ok(None) };
+        Ok(Some(matrix(argument, &numbers, [count, size])?.to_vec()))
     };
-    let starts = [rows_of("xs", xs.len())?, rows_of("us", us.len())?];
-    let [references, weights] = ["references", "weights"].map(|name| rows(data, name, count));
+    let starts = [array("xs", "start: xs", sizes[0])?, array("us", "start: us", sizes[1])?];
+    let x0 = array("x0", "x0", nx)?;
+    let [references, weights, placements] = ["references", "weights", "contacts"].map(|name| rows(data, name, count));
     let mut kept = Vec::new();
     for name in NUMBERS {
         kept.push((name, 1, place(py, None, &[count])?));
@@ -83,11 +94,12 @@ pub(crate) fn solve_variations<'py>(
     }
     let columns = Columns { status: vec![""; count], iterations: vec![0; count], arrays, errors: Vec::new() };
     let many = Many {
-        shell,
+        shell: shell.problem,
         x0,
         starts,
         references: references?,
         weights: weights?,
+        placements: placements?,
         vary,
         returned: Mutex::new(Vec::new()),
         columns: Mutex::new(columns),
@@ -96,7 +108,7 @@ pub(crate) fn solve_variations<'py>(
         is_stopped: AtomicBool::new(false),
         report,
     };
-    let solved = py.detach(|| batch.solve(count, &many).map(drop));
+    let solved = py.detach(|| batch(count, &many).map(drop));
     let Many { columns, signals, .. } = many;
     let (signals, raised) = signals.into_inner().unwrap_or_else(PoisonError::into_inner);
     signals.finish()?;
@@ -117,7 +129,92 @@ pub(crate) fn solve_variations<'py>(
     Ok((found, errors))
 }
 
-/// Returns the numbers of each cost in the list `name`, which has a row for each variation.
+/// Function that solves a number of variations.
+type Batch = Box<dyn FnOnce(usize, &Many<'_>) -> Result<usize, rust::Error> + Send>;
+
+/// Nominal problem and settings of the solves, of any class of solvers.
+struct Shell<'a> {
+    problem: &'a Py<Problem>,
+    solver: AnySolver<'a>,
+}
+
+/// Solver of any class.
+enum AnySolver<'a> {
+    Fddp(&'a Mutex<rust::Fddp>),
+    InteriorPoint(&'a Mutex<rust::InteriorPoint>),
+    AugmentedLagrangian(&'a Mutex<rust::AugmentedLagrangian>),
+}
+
+impl<'a> Shell<'a> {
+    /// Returns the parts of a Python solver.
+    fn of(solver: &'a Bound<'_, PyAny>) -> PyResult<Self> {
+        Ok(if let Ok(solver) = solver.cast::<Fddp>() {
+            Self { problem: &solver.get().problem, solver: AnySolver::Fddp(&solver.get().solver) }
+        } else if let Ok(solver) = solver.cast::<InteriorPoint>() {
+            Self { problem: &solver.get().problem, solver: AnySolver::InteriorPoint(&solver.get().solver) }
+        } else {
+            let solver = solver.cast::<AugmentedLagrangian>()?.get();
+            Self { problem: &solver.problem, solver: AnySolver::AugmentedLagrangian(&solver.solver) }
+        })
+    }
+
+    /// Returns a function that solves variations with these settings. FDDP solves several variations at a time in
+    /// lanes, if no setting forbids this: segments, and a time budget of each solve. The time budget is the budget of
+    /// all solves if `whole` is set.
+    fn batch(
+        &self,
+        problem: &rust::Problem,
+        threads: usize,
+        start: Option<[Vec<f64>; 2]>,
+        whole: bool,
+    ) -> PyResult<Batch> {
+        match &self.solver {
+            AnySolver::Fddp(solver) => {
+                let solver = lock("solver", solver)?;
+                if solver.settings.segments > 1 || solver.settings.time_budget.is_some() && !whole {
+                    return one_by_one(problem, threads, start, solver.clone(), whole, |s| &mut s.settings.time_budget);
+                }
+                let mut batch = BatchFddp::new(problem, threads).map_err(problem_error)?;
+                batch.settings = solver.settings.clone();
+                if let Some([xs, us]) = start {
+                    batch.set_start(&xs, &us).map_err(problem_error)?;
+                }
+                Ok(Box::new(move |count, many| batch.solve(count, many)))
+            }
+            AnySolver::InteriorPoint(solver) => {
+                let solver = lock("solver", solver)?.clone();
+                one_by_one(problem, threads, start, solver, whole, |solver| &mut solver.settings.time_budget)
+            }
+            AnySolver::AugmentedLagrangian(solver) => {
+                let solver = lock("solver", solver)?.clone();
+                one_by_one(problem, threads, start, solver, whole, |solver| &mut solver.inner.time_budget)
+            }
+        }
+    }
+}
+
+/// Returns a function that solves variations one by one on each thread. If `whole` is set, the solver's time budget
+/// limits all solves together.
+fn one_by_one<S: SingleSolver + 'static>(
+    problem: &rust::Problem,
+    threads: usize,
+    start: Option<[Vec<f64>; 2]>,
+    solver: S,
+    whole: bool,
+    budget: fn(&mut S) -> &mut Option<Duration>,
+) -> PyResult<Batch> {
+    let mut many = OneByOne::<S>::new(problem, threads).map_err(problem_error)?;
+    many.solver = solver;
+    if whole {
+        many.time_budget = budget(&mut many.solver).take();
+    }
+    if let Some([xs, us]) = start {
+        many.set_start(&xs, &us).map_err(problem_error)?;
+    }
+    Ok(Box::new(move |count, variations| many.solve(count, variations)))
+}
+
+/// Returns the numbers of each name in the list `name`, which has a row for each variation.
 fn rows(data: &Bound<'_, PyDict>, name: &str, count: usize) -> PyResult<Vec<(String, Vec<f64>)>> {
     let mut all = Vec::new();
     let Some(list) = data.get_item(name)? else { return Ok(all) };
@@ -137,6 +234,8 @@ struct Many<'a> {
     starts: [Option<Vec<f64>>; 2],
     references: Vec<(String, Vec<f64>)>,
     weights: Vec<(String, Vec<f64>)>,
+    /// Placements of contacts. For each variation 3 numbers of a position, or the 16 numbers of a homogeneous matrix.
+    placements: Vec<(String, Vec<f64>)>,
     vary: Option<(Py<PyAny>, Py<PyList>)>,
     /// Problems that `vary` has returned, with the index of their variation, until they are solved.
     returned: Mutex<Vec<(usize, Py<Problem>)>>,
@@ -218,19 +317,24 @@ impl ManyProblems for Many<'_> {
         self.change(i, problem)?;
         let row = |numbers: &[f64], count: usize| i * (numbers.len() / count)..(i + 1) * (numbers.len() / count);
         let count = self.columns.lock().unwrap_or_else(PoisonError::into_inner).status.len();
-        for (start, rows) in [&mut *xs, us].into_iter().zip(&self.starts) {
-            if let Some(rows) = rows {
-                start.copy_from_slice(&rows[row(rows, count)]);
+        for (to, starts) in [&mut *xs, us].into_iter().zip(&self.starts) {
+            if let Some(starts) = starts {
+                to.copy_from_slice(&starts[row(starts, count)]);
             }
         }
         if let Some(x0) = &self.x0 {
             problem.set_x0(&x0[row(x0, count)])?;
         }
         for (name, numbers) in &self.references {
-            found(name, problem.set_references(name, &numbers[row(numbers, count)])?)?;
+            found("cost", name, problem.set_references(name, &numbers[row(numbers, count)])?)?;
         }
         for (name, numbers) in &self.weights {
-            found(name, problem.set_weights(name, &numbers[row(numbers, count)])?)?;
+            found("cost", name, problem.set_weights(name, &numbers[row(numbers, count)])?)?;
+        }
+        for (name, numbers) in &self.placements {
+            let numbers = &numbers[row(numbers, count)];
+            let change = |contact: &mut condyle::ContactConstraint| place_contact(contact, numbers);
+            found("contact", name, problem.change_contacts(name, change)?)?;
         }
         if problem.nx() == nx && xs.len() >= nx {
             xs[..nx].copy_from_slice(problem.x0());
@@ -295,9 +399,21 @@ impl ManyProblems for Many<'_> {
     }
 }
 
-/// Returns an error for a cost that no knot has.
-fn found(name: &str, exists: bool) -> PyResult<()> {
-    if exists { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
+/// Sets the position of a contact's target, or its placement from a homogeneous matrix.
+fn place_contact(contact: &mut condyle::ContactConstraint, numbers: &[f64]) {
+    let placement = &mut contact.target.placement;
+    if numbers.len() < PLACEMENT {
+        placement.translation = condyle::Vec3::new(numbers[0], numbers[1], numbers[2]);
+        return;
+    }
+    let column = |k: usize| condyle::Vec3::new(numbers[k], numbers[4 + k], numbers[8 + k]);
+    placement.rotation = condyle::spatial::Mat3 { x: column(0), y: column(1), z: column(2) };
+    placement.translation = column(3);
+}
+
+/// Returns an error for a cost or a contact that no knot has.
+fn found(kind: &str, name: &str, exists: bool) -> PyResult<()> {
+    if exists { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a {kind} '{name}'"))) }
 }
 
 /// Returns whether an exception is the fault of a variation, and does not end the call.

@@ -6,7 +6,7 @@ use crate::arrays::{class, matrix, place, tensor, vector, writable};
 use crate::exceptions::problem_error;
 use crate::signals::{self, Signals};
 use condyle::optimal as rust;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use rust::{RolloutResults, Rollouts};
@@ -51,25 +51,25 @@ pub(crate) fn rollout_many<'py>(
     x0: Option<&Bound<'py, PyAny>>,
     states: bool,
     gradients: bool,
-    threads: usize,
+    threads: i64,
 ) -> PyResult<Bound<'py, PyAny>> {
-    if threads == 0 {
-        return Err(PyValueError::new_err("threads: expected at least 1, found 0"));
-    }
+    let Some(threads) = usize::try_from(threads).ok().filter(|threads| *threads > 0) else {
+        return Err(PyValueError::new_err(format!("threads: expected at least 1, found {threads}")));
+    };
     let inner = lock("problem", &problem.inner)?;
     let (horizon, nx, ndx) = (inner.horizon(), inner.nx(), inner.ndx());
-    let (count, length) = (us.len()?, inner.control_range(horizon).end);
-    let us_nu = common_nu(&inner).filter(|_| us.getattr("ndim").and_then(|ndim| ndim.extract()).unwrap_or(3) != 2);
+    let length = inner.control_range(horizon).end;
+    let us_shape = shape_of("us", us)?;
+    let count = us_shape.first().copied().unwrap_or(0);
+    let us_nu = common_nu(&inner).filter(|_| us_shape.len() != 2);
     let us: Vec<f64> = match us_nu {
         Some(nu) => tensor("us", us, [count, horizon, nu])?.to_vec(),
         None => matrix("us", us, [count, length])?.to_vec(),
     };
     let x0 = match x0 {
         None => inner.x0().to_vec(),
-        Some(x0) => match matrix("x0", x0, [count, nx]) {
-            Ok(each) => each.to_vec(),
-            Err(_) => vector("x0", x0, nx)?.to_vec(),
-        },
+        Some(x0) if shape_of("x0", x0)?.len() == 2 => matrix("x0", x0, [count, nx])?.to_vec(),
+        Some(x0) => vector("x0", x0, nx)?.to_vec(),
     };
     let mut rollouts = Rollouts::new(&inner, threads.min(count.max(1))).map_err(problem_error)?;
     drop(inner);
@@ -113,4 +113,19 @@ pub(crate) fn rollout_many<'py>(
     done.map_err(problem_error)?;
     drop(borrowed);
     class!(py, "ManyRollouts")?.call1(PyTuple::new(py, arrays)?)
+}
+
+/// Returns the shape of an array, or of the array that NumPy makes from lists.
+fn shape_of(argument: &str, values: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+    let py = values.py();
+    if values.is_none() {
+        return Err(PyTypeError::new_err(format!("{argument}: expected an array of real numbers, found None")));
+    }
+    let array = py.import("numpy")?.call_method1("asarray", (values,)).map_err(|error| {
+        match error.is_instance_of::<PyValueError>(py) {
+            true => PyValueError::new_err(format!("{argument}: {}", error.value(py))),
+            false => error,
+        }
+    })?;
+    array.getattr("shape")?.extract()
 }
