@@ -120,13 +120,18 @@ fn quadratic(name: &str, weight: f64, residual: Residual) -> Cost {
 }
 
 fn arm(bounded: bool) -> Problem {
+    arm_with(Vec::new(), bounded)
+}
+
+/// Returns the problem of an arm with additional costs.
+fn arm_with(others: Vec<Cost>, bounded: bool) -> Problem {
     let model = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
     let rest = quadratic("rest", 1e-1, Residual::State { reference: x0.clone() });
     let effort = quadratic("effort", 1e-4, Residual::ControlGravity);
     let target = Vec3::new(0.35, 0.2, 0.6);
     let reach = quadratic("reach", 1e2, Residual::FrameTranslation { frame: "tool".into(), target });
-    let mut knot = FreeDynamics::running(model.clone(), 0.02, vec![rest.clone(), effort]).unwrap();
+    let mut knot = FreeDynamics::running(model.clone(), 0.02, [vec![rest.clone(), effort], others].concat()).unwrap();
     if bounded {
         knot = knot.with_bounds(vec![-12.0; 7], vec![12.0; 7]);
     }
@@ -216,7 +221,37 @@ fn vary_gait(i: usize, problem: &mut Problem) -> Result<(), Error> {
 
 #[test]
 fn an_arm() {
-    check(arm(false), Settings::default(), &vary_arm, 0.0);
+    check(arm(false), Settings::default(), &vary_arm, 1e-12);
+}
+
+#[test]
+fn an_arm_whose_problems_have_other_numbers_of_residual_rows() {
+    let excess = Activation::Barrier { lower: vec![-2.0; 7], upper: vec![2.0; 7] };
+    let problem = arm_with(vec![Cost::new("excess", 1e-2, Residual::ControlGravity, excess)], false);
+    check(problem, Settings::default(), &vary_arm, 1e-11); // the bounds of the barrier amplify rounding
+}
+
+#[test]
+fn a_sweep_that_diverges_fails_alone() {
+    let wild = |i: usize, problem: &mut Problem| {
+        vary_arm(i, problem)?;
+        let speed = if i == 5 { 1e12 } else { 0.0 };
+        let x0 = [&problem.x0()[..7], &[speed; 7]].concat();
+        problem.set_x0(&x0)
+    };
+    let mut nominal = arm(false);
+    let mut solver = BatchFddp::new(&nominal, 1).unwrap();
+    let rows = together(&mut solver, &[3, 4, 5, 6], &wild);
+    assert_eq!(rows[..2], together(&mut solver, &[3, 4], &wild));
+    assert_eq!(rows[3..], together(&mut solver, &[6], &wild));
+    let mut xs = nominal.x0().repeat(21);
+    let us = nominal.quasi_static(&xs).unwrap();
+    wild(5, &mut nominal).unwrap();
+    xs[..14].copy_from_slice(nominal.x0());
+    let single = Row::of(Fddp::new(&nominal).solve(&mut nominal, &xs, &us).unwrap());
+    assert_eq!(single.status, Status::NotFinite);
+    let row = rows[2].as_ref().unwrap();
+    assert_eq!((row.status, row.iterations), (single.status, single.iterations));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Solution of many problems of one shape by FDDP, several at a time in the lanes of SIMD registers.
 
+use super::directions::{Directions, Seeker};
 use super::many::{ManyProblems, spread};
 use super::rollout::{Nominal, SeveralProblems, Trials};
 use super::search::Search;
@@ -14,13 +15,19 @@ use crate::solvers::fddp::Fddp;
 use crate::time::Instant;
 use core::ops::ControlFlow;
 
+/// Share of the lanes from which on the problems that wait for their search directions no longer wait for the line
+/// searches of the others. The sweep of few problems takes as long as the sweep of all.
+const FULL: f64 = 0.75;
+
 /// Solver of many problems that have the same shape: the same numbers of knots, states and controls, and the same kinds
 /// of dynamics and costs. The problems may differ in initial states, targets, weights, bounds, durations, and in the
 /// targets of contacts.
 ///
 /// As many problems as a SIMD register has lanes are solved together. Each problem has its own iterations of [`Fddp`]:
-/// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. A
-/// problem that has ended is replaced by the next one. Each thread solves its own problems.
+/// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. The
+/// sweeps run in lanes too, if the robot is an arm of at most 16 joints, each with a motor, without bounds on controls
+/// and in [inverse-dynamics form](Settings::inverse_dynamics_form). Other problems are swept one by one. A problem that
+/// has ended is replaced by the next one. Each thread solves its own problems.
 ///
 /// The result of a problem does not depend on the other problems, to the bit. It differs from the result of [`Fddp`] by
 /// rounding at most, because [`Fddp`] rolls out a single trial by another algorithm.
@@ -77,6 +84,8 @@ struct Worker {
     trials: Trials,
     /// Linear-quadratic problem and sweep, which all slots use in turn, so that they stay in the caches.
     linear: Linear,
+    /// Search directions of all slots in lanes; `None` if directions are computed one by one.
+    directions: Option<Directions>,
 }
 
 /// Storage of a linear-quadratic problem, and its sweep.
@@ -104,6 +113,8 @@ struct Task {
     search: Search,
     /// Number of step lengths that this search has tried.
     tried: usize,
+    /// Whether the iteration waits for its search direction. If not, its line search is running.
+    waits: bool,
 }
 
 type Queue<'a, P> = super::many::Queue<'a, P, Settings>;
@@ -175,8 +186,9 @@ impl Worker {
         trials.keep_motions(nominal.motion_size());
         let slots = (0..width).map(|_| slot()).collect::<Result<_, Error>>()?;
         let knots = SolverLoop::knots_of(&nominal);
+        let directions = Directions::new(&nominal, &knots);
         let linear = Linear { sweep: Sweep::new(&knots), knots };
-        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, linear })
+        Ok(Self { nominal, start: [xs.to_vec(), us.to_vec()], slots, trials, linear, directions })
     }
 
     /// Solves problems until the queue is empty or a reason to stop exists.
@@ -198,13 +210,18 @@ impl Worker {
             if self.slots.iter().all(|slot| slot.task.is_none()) {
                 return;
             }
-            self.search(queue);
+            let searching = self.slots.iter().filter(|slot| slot.searching().is_some()).count();
+            let waiting = self.slots.iter().filter(|slot| slot.task.is_some()).count() - searching;
+            match searching > 0 && (waiting as f64) < FULL * self.slots.len() as f64 {
+                true => self.search(queue),
+                false => self.find_directions(queue),
+            }
         }
     }
 
     /// Begins problem `index` in slot k. A problem that cannot share lanes is solved at once.
     fn begin<P: ManyProblems>(&mut self, k: usize, index: usize, queue: &Queue<'_, P>) {
-        let Self { nominal, start, slots, linear, .. } = self;
+        let Self { nominal, start, slots, linear, directions, .. } = self;
         let Slot { problem, solver, .. } = &mut slots[k];
         let begin = Instant::now();
         let [mut xs, mut us] = start.clone();
@@ -230,21 +247,47 @@ impl Worker {
             Ok(now) => now,
             Err(error) => return queue.problems.solved(index, problem, Err(error.into())),
         };
-        let task = Task { index, begin, now, iteration: 0, search: Search::default(), tried: 0 };
-        self.slots[k].advance(queue, task, linear);
+        let task = Task { index, begin, now, iteration: 0, search: Search::default(), tried: 0, waits: false };
+        self.slots[k].advance(queue, task, linear, directions.is_some());
+    }
+
+    /// Computes the search directions of all problems that wait for them, in lanes. A problem whose sweep fails there
+    /// is swept alone, with a larger regularisation.
+    fn find_directions<P: ManyProblems>(&mut self, queue: &Queue<'_, P>) {
+        let Self { slots, linear, directions: Some(directions), .. } = self else { return };
+        let mut seekers = Vec::with_capacity(slots.len());
+        for Slot { problem, solver, task } in &mut *slots {
+            let Some(task) = task.as_mut().filter(|task| task.waits) else { continue };
+            if task.search.accepted {
+                task.now.merit.gap = solver.iterate.update_gaps(problem);
+            }
+            seekers.push(Seeker { problem, solver, now: &mut task.now });
+        }
+        let mut found = directions.run(&mut seekers, |feasible| queue.settings.counts_gaps(feasible)).into_iter();
+        for slot in slots {
+            let Some(mut task) = slot.task.take_if(|task| task.waits) else { continue };
+            match found.next().flatten() {
+                Some(expected) => {
+                    task.search = slot.solver.line_search.begin_expecting(expected, queue.settings, task.search);
+                    task.waits = false;
+                    slot.task = Some(task);
+                }
+                None => slot.find_direction(queue, task, linear),
+            }
+        }
     }
 
     /// Rolls out trials of all problems, and ends the line searches that accept a trial or have no more step lengths.
     fn search<P: ManyProblems>(&mut self, queue: &Queue<'_, P>) {
-        let Self { slots, trials, linear, .. } = self;
+        let Self { slots, trials, linear, directions, .. } = self;
         let most = queue.settings.step_lengths;
         // one trial for each problem, and then the next step lengths of the problems whose first trial was rejected
-        let mut counts: Vec<usize> = slots.iter().map(|slot| usize::from(slot.task.is_some())).collect();
+        let mut counts: Vec<usize> = slots.iter().map(|slot| usize::from(slot.searching().is_some())).collect();
         let mut free = trials.width() - counts.iter().sum::<usize>();
         while free > 0 {
             let before = free;
             for (slot, count) in slots.iter().zip(&mut counts) {
-                let Some(task) = &slot.task else { continue };
+                let Some(task) = slot.searching() else { continue };
                 if task.tried > 0 && task.tried + *count < most && free > 0 {
                     (*count, free) = (*count + 1, free - 1);
                 }
@@ -256,7 +299,7 @@ impl Worker {
         let (mut problems, mut of, mut steps) = (Vec::new(), Vec::new(), Vec::new());
         let horizon = slots[0].problem.horizon();
         for (slot, &count) in slots.iter_mut().zip(&counts) {
-            let Some(task) = &slot.task else { continue };
+            let Some(task) = slot.task.as_ref().filter(|task| !task.waits) else { continue };
             let SolverLoop { iterate, line_search, .. } = &slot.solver;
             let counts_gaps = queue.settings.counts_gaps(task.now.merit.feasible);
             of.extend((0..count).map(|_| problems.len()));
@@ -266,7 +309,7 @@ impl Worker {
         trials.run(&mut SeveralProblems { problems, of }, &steps, 0..=horizon);
         let mut first = 0;
         for (slot, &count) in slots.iter_mut().zip(&counts) {
-            let Some(mut task) = slot.task.take() else { continue };
+            let Some(mut task) = slot.task.take_if(|task| !task.waits) else { continue };
             let Slot { problem, solver, .. } = slot;
             let view = problem.action_view();
             for i in first..first + count {
@@ -295,24 +338,42 @@ impl Worker {
             task.iteration += 1;
             match stop {
                 Some(status) => slot.end(queue, task, status, linear),
-                None => slot.advance(queue, task, linear),
+                None => slot.advance(queue, task, linear, directions.is_some()),
             }
         }
     }
 }
 
 impl Slot {
-    /// Begins the next iteration of a problem: derivatives, sweep, and the expected decrease of its line search. Ends
-    /// the solve if there is a reason to stop.
-    fn advance<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, mut task: Task, linear: &mut Linear) {
-        let Self { problem, solver, .. } = self;
-        let (settings, Linear { knots, sweep }) = (queue.settings, &mut *linear);
+    /// Returns the problem of this slot if its line search is running.
+    fn searching(&self) -> Option<&Task> {
+        self.task.as_ref().filter(|task| !task.waits)
+    }
+
+    /// Begins the next iteration of a problem. Ends the solve if there is a reason to stop. With `waits`, the problem
+    /// then waits for its search direction, unless the direction cannot be computed in lanes.
+    fn advance<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, mut task: Task, linear: &mut Linear, waits: bool) {
+        let settings = queue.settings;
         if !task.now.is_finite() && task.iteration == 0 {
             return self.end(queue, task, Status::NotFinite, linear);
         }
         if task.iteration == Pass::default().most(settings) {
             return self.end(queue, task, Status::MaxIterations, linear);
         }
+        task.tried = 0;
+        if waits && self.solver.uses_inverse_dynamics() {
+            task.waits = true;
+            self.task = Some(task);
+        } else {
+            self.find_direction(queue, task, linear);
+        }
+    }
+
+    /// Finds the search direction of one problem: derivatives, sweep, and the expected decrease of its line search.
+    /// Ends the solve if there is no direction.
+    fn find_direction<P: ManyProblems>(&mut self, queue: &Queue<'_, P>, mut task: Task, linear: &mut Linear) {
+        let Self { problem, solver, .. } = self;
+        let (settings, Linear { knots, sweep }) = (queue.settings, &mut *linear);
         // the derivatives are always computed, because other problems have used their storage
         let steps = [true, task.search.accepted];
         solver.exchange(knots, sweep, task.iteration > 0);
@@ -328,7 +389,7 @@ impl Slot {
         if let Err(status) = found {
             return self.end(queue, task, status, linear);
         }
-        task.tried = 0;
+        task.waits = false;
         self.task = Some(task);
     }
 

@@ -3,6 +3,7 @@
 mod augmented_lagrangian;
 mod batch;
 mod best;
+mod directions;
 mod fddp;
 mod interior_point;
 mod iterate;

@@ -187,11 +187,23 @@ impl LineSearch {
     /// Begins a search: computes the expected decrease of the cost.
     pub(super) fn begin(&mut self, around: &Surroundings<'_>, last: Search) -> Search {
         self.expect(around);
+        self.begin_expecting(self.expected, around.settings, last)
+    }
+
+    /// Begins a search with known terms dg and dq of the expected decrease. The products Vxx f are in
+    /// [`curved_gaps_mut`](Self::curved_gaps_mut).
+    pub(super) fn begin_expecting(&mut self, expected: [f64; 2], settings: &Settings, last: Search) -> Search {
+        self.expected = expected;
         let mut search = Search { accepted: false, left_best: false, ..last };
-        if around.settings.method == DdpMethod::Ddp {
-            [search.d1, search.d2] = self.expected;
+        if settings.method == DdpMethod::Ddp {
+            [search.d1, search.d2] = expected;
         }
         search
+    }
+
+    /// Returns the storage of the products Vxx f of all knots, (N + 1)·ndx.
+    pub(super) fn curved_gaps_mut(&mut self) -> &mut [f64] {
+        &mut self.curved_gaps
     }
 
     /// Returns the step lengths of a search, 1, ½, ¼, ….

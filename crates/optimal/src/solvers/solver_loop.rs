@@ -18,6 +18,7 @@ use crate::error::Error;
 use crate::lq::{LqKnot, Sweep, SweepError};
 use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::time::Instant;
+use std::ops::Range;
 use std::time::Duration;
 
 /// Number of iterations for which a solve allocates the trace at its beginning; the trace grows if more are made.
@@ -409,22 +410,7 @@ impl SolverLoop {
         let (Solution { xs, us, .. }, shape) = (&*solution, solution.shape());
         let complete = |model: &dyn ActionModel, first: usize, knots: &mut [LqKnot]| {
             for (t, knot) in (first..).zip(knots) {
-                match gaps.get(shape.dx(t + 1)) {
-                    Some(gap) if !feasible => knot.f.as_mut_slice().copy_from_slice(gap),
-                    _ => knot.f.fill(0.0),
-                }
-                match model.bounds(t) {
-                    Some((lower, upper)) if feasible => {
-                        for (i, u) in us[shape.u(t)].iter().enumerate() {
-                            knot.lower[i] = lower[i] - u;
-                            knot.upper[i] = upper[i] - u;
-                        }
-                    }
-                    _ => {
-                        knot.lower.fill(f64::NEG_INFINITY);
-                        knot.upper.fill(f64::INFINITY);
-                    }
-                }
+                complete(model, t, knot, feasible, gaps.get(shape.dx(t + 1)), &us[shape.u(t)]);
             }
         };
         let (mut outcome, mut sweeping) = (Ok(()), Duration::ZERO);
@@ -451,6 +437,32 @@ impl SolverLoop {
         }
         timings.sweep += self.clock.lasted(Phase::Sweep, sweeping);
         Some(outcome)
+    }
+
+    /// Computes the knots of a range of the linear-quadratic problem at the iterate into `lq_knots`, as the derivatives
+    /// of an iteration do.
+    pub(super) fn calc_diff_part(
+        &self,
+        problem: &mut Problem,
+        now: &Progress,
+        range: Range<usize>,
+        lq_knots: &mut [LqKnot],
+    ) {
+        let Iterate { solution: Solution { xs, us, .. }, gaps, motions, knows_motions, .. } = &self.iterate;
+        let what = match self.inverse_dynamics {
+            true => Evaluation::Equations { motions: if *knows_motions { motions } else { &[] }, rows: false },
+            false => Evaluation::Derivatives,
+        };
+        problem.calc_diff_part(what, [xs, us], range.clone(), lq_knots);
+        let shape = problem.shape();
+        for (t, knot) in range.zip(lq_knots) {
+            complete(problem.action(t), t, knot, now.merit.feasible, gaps.get(shape.dx(t + 1)), &us[shape.u(t)]);
+        }
+    }
+
+    /// Returns whether the solve uses the inverse-dynamics form of knots, where actions support it.
+    pub(super) fn uses_inverse_dynamics(&self) -> bool {
+        self.inverse_dynamics
     }
 
     /// Returns whether the sweep processes knots as soon as their derivatives are known.
@@ -535,7 +547,33 @@ impl SolverLoop {
     }
 }
 
+/// Completes knot t of the linear-quadratic problem: with the gap after it until the trajectory is feasible, and with
+/// its bounds afterwards.
+fn complete(model: &dyn ActionModel, t: usize, knot: &mut LqKnot, feasible: bool, gap: Option<&[f64]>, u: &[f64]) {
+    match gap {
+        Some(gap) if !feasible => knot.f.as_mut_slice().copy_from_slice(gap),
+        _ => knot.f.fill(0.0),
+    }
+    match model.bounds(t) {
+        Some((lower, upper)) if feasible => {
+            for (i, u) in u.iter().enumerate() {
+                knot.lower[i] = lower[i] - u;
+                knot.upper[i] = upper[i] - u;
+            }
+        }
+        _ => {
+            knot.lower.fill(f64::NEG_INFINITY);
+            knot.upper.fill(f64::INFINITY);
+        }
+    }
+}
+
 impl Progress {
+    /// Records that another sweep has written the gains of the iterate to the solution.
+    pub(super) fn stores_gains(&mut self) {
+        (self.swept, self.swept_best) = (false, false);
+    }
+
     /// Returns whether the cost and the gaps of the iterate are finite.
     pub(super) fn is_finite(&self) -> bool {
         self.merit.cost.is_finite() && self.merit.gap.is_finite()

@@ -25,15 +25,13 @@ use condyle_linalg::{
 };
 
 /// Maximum number of coordinates. For more coordinates, the form that skips zeros in the rows is faster.
-const MOST: usize = 16;
-/// Maximum number of residual rows in G.
-const MOST_COSTS: usize = 16;
+pub(in crate::lq) const MOST: usize = 16;
 
 /// Form of knots of small arms in which every coordinate has a motor, with its scratch.
 #[derive(Debug, Clone)]
 pub(in crate::lq) struct Driven {
     /// Scaled rows of U and G with columns for (w, δv, δq). Each row ends with its entry of the gradient and with
-    /// zeros. Shape: `stride` × (MOST + MOST_COSTS); empty for larger robots.
+    /// zeros. Shape: `stride` × (MOST + [`MOST_COSTS`](Self::MOST_COSTS)); empty for larger robots.
     rows: Aligned,
     stride: usize,
     /// Number of rows in use in `rows`.
@@ -43,11 +41,14 @@ pub(in crate::lq) struct Driven {
 }
 
 impl Driven {
+    /// Maximum number of residual rows in G.
+    pub(in crate::lq) const MOST_COSTS: usize = 16;
+
     /// Allocates the scratch for n states.
     pub(super) fn new(n: usize) -> Self {
         let nv = if n <= 2 * MOST { n / 2 } else { 0 };
         let stride = padded(4 * nv + 1 + 3 * SLACK);
-        Self { rows: Aligned::zeros(stride * (nv + MOST_COSTS)), stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
+        Self { rows: Aligned::zeros(stride * (nv + Self::MOST_COSTS)), stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
     }
 
     /// Returns the number of rows that this form needs below H.
@@ -57,13 +58,13 @@ impl Driven {
 
     /// Returns whether this form applies to a knot. `regularisation` is the number that the sweep adds to the diagonal
     /// of R.
-    pub(super) fn takes(knot: &LqKnot, regularisation: f64) -> bool {
+    pub(in crate::lq) fn takes(knot: &LqKnot, regularisation: f64) -> bool {
         let (nv, InverseDynamicsForm { own, slopes, diagonal, .. }) = (knot.ndx() / 2, &knot.inverse_dynamics);
         nv <= MOST
             && *own == [[0, 0, nv]]
             && knot.nu() == nv
             && knot.structure.euler().is_some_and(|(_, blocks)| blocks.is_empty())
-            && slopes.len() <= MOST_COSTS
+            && slopes.len() <= Self::MOST_COSTS
             && slopes.iter().all(|slopes| slopes[1] > 0.0)
             && diagonal[nv..].iter().all(|r| r + regularisation > 0.0)
     }

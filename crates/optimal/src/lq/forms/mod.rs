@@ -15,7 +15,7 @@ use super::feedback::KnotFeedback;
 use super::knot::{Hessian, LqKnot};
 use super::workspace::Workspace;
 use dense::Dense;
-use driven::Driven;
+pub(super) use driven::{Driven, MOST as DRIVEN_MOST};
 use euler::Euler;
 use inverse_dynamics::InverseDynamics;
 

@@ -108,6 +108,40 @@ impl Problem {
         evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], what.without_equations(), &mut results);
     }
 
+    /// Computes the derivatives of [`calc_diff_as`](Self::calc_diff_as) at the knots of a range alone, into `lq_knots`.
+    /// The terminal knot may be in the range.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    #[track_caller]
+    pub(crate) fn calc_diff_part(
+        &mut self,
+        what: Evaluation<'_>,
+        [xs, us]: [&[f64]; 2],
+        range: Range<usize>,
+        lq_knots: &mut [LqKnot],
+    ) {
+        let horizon = self.horizon();
+        self.assert_trajectory(xs, us);
+        assert_length("lq_knots", lq_knots.len(), range.len());
+        clear(lq_knots);
+        for (action, knots) in &self.runs {
+            let knots = knots.start.max(range.start)..knots.end.min(range.end);
+            if knots.is_empty() {
+                continue;
+            }
+            let (x, u) = self.places(&knots);
+            let mut results = Results::derivatives(&mut lq_knots[knots.start - range.start..knots.end - range.start]);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], what.part(knots, horizon), &mut results);
+        }
+        if range.end > horizon {
+            let mut results = Results::derivatives(&mut lq_knots[horizon - range.start..]);
+            let x = &xs[self.shape.x(horizon)];
+            evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], what.without_equations(), &mut results);
+        }
+    }
+
     /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool from which it is
     /// called, or else of the global pool. The result is the same to the last bit. `sweep` is called on the calling
     /// thread for each finished group, from the end of the horizon to its beginning. Its arguments are the model, the
@@ -148,10 +182,7 @@ impl Problem {
     fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         self.assert_trajectory(xs, us);
         assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
-        for knot in lq_knots {
-            knot.structure.set_dense();
-            knot.rows.clear();
-        }
+        clear(lq_knots);
     }
 
     /// Returns for each knot the controls that hold its state still, as nearly as controls can achieve: see
@@ -217,5 +248,13 @@ impl Problem {
     fn assert_trajectory(&self, xs: &[f64], us: &[f64]) {
         assert_length("xs", xs.len(), (self.horizon() + 1) * self.nx());
         assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
+    }
+}
+
+/// Clears the structures of A and B, and the constraint rows.
+fn clear(lq_knots: &mut [LqKnot]) {
+    for knot in lq_knots {
+        knot.structure.set_dense();
+        knot.rows.clear();
     }
 }

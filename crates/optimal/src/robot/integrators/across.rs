@@ -1,7 +1,7 @@
 //! Values at one knot of several problems, with the dynamics of all problems in one batch.
 
-use super::Integrated;
 use super::accelerations::{ROBOT, robot, robot_mut};
+use super::{Integrated, Method, Work, euler};
 use crate::problem::{Evaluation, KnotGroup, Results};
 use crate::robot::continuous::{ContinuousModel, KnotInput};
 use crate::robot::dynamics::batch::Group;
@@ -54,6 +54,15 @@ impl<M: ContinuousModel> Integrated<M> {
                 continue;
             }
             let other = Self::of_action(&mut *others[k - 1]);
+            if self.method == Method::Euler {
+                let dt = other.duration_of(t);
+                let owner = robot_mut(&mut other.inner).expect(ROBOT);
+                let (inner, Work { retraction, .. }) = self.parts();
+                *cost = euler::calc(inner, input, dt, retraction, next, |inner| {
+                    robot_mut(inner).expect(ROBOT).values_of(lane, input, owner)
+                });
+                continue;
+            }
             let mut exchange = |other: &mut Self| {
                 let (own, other) = (robot_mut(&mut self.inner), robot_mut(&mut other.inner));
                 own.expect(ROBOT).exchange(lane, other.expect(ROBOT));

@@ -2,25 +2,26 @@
 //! multiplied by Δt.
 #![allow(non_snake_case)] // names follow the literature: A, B
 
-use super::accelerations::{slopes, steps, values};
+use super::accelerations::{slopes, steps};
 use super::retraction::Retraction;
 use crate::lq::LqKnot;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use crate::robot::dynamics::batch::Group;
 use condyle_linalg::{Vector, Vectorized, at_level};
 
-/// Writes the next state of one knot of the last computed group. Returns the cost of the knot.
+/// Writes the next state of a knot after `dt` seconds. Returns the cost of the knot. `values` returns the knot's
+/// accelerations, its cost ℓ and its limit term.
 pub(super) fn calc<M: ContinuousModel>(
     model: &mut M,
-    lane: usize,
     input: KnotInput<'_>,
     dt: f64,
     step: &mut Retraction,
     next: &mut [f64],
+    values: impl for<'m> FnOnce(&'m mut M) -> (&'m [f64], f64, f64),
 ) -> f64 {
     let (q, v) = input.x.split_at(model.nq());
     let (q_next, v_next) = next.split_at_mut(q.len());
-    let (a, cost, term) = values(model, lane, input, true);
+    let (a, cost, term) = values(model);
     for k in 0..v.len() {
         v_next[k] = v[k] + a[k] * dt; // v⁺ = v + a Δt
     }

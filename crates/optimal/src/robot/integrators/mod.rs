@@ -228,7 +228,9 @@ impl<M: ContinuousModel> Integrated<M> {
         let method = self.method;
         let (inner, Work { retraction, runge_kutta, .. }) = self.parts();
         match (method, runge_kutta) {
-            (Method::Euler, _) => euler::calc(inner, lane, input, dt, retraction, next),
+            (Method::Euler, _) => {
+                euler::calc(inner, input, dt, retraction, next, |inner| values(inner, lane, input, true))
+            }
             (_, Some(method)) => method.calc(inner, input, dt, next),
             (Method::Impact, _) => {
                 let nq = inner.nq();
