@@ -18,8 +18,8 @@
 //!   actions, a robot's [`Limit`](robot::Limit)s and bounds on controls. Each iteration is one sweep.
 //!   [`tick`](InteriorPoint::tick) makes a fixed number of sweeps, for model-predictive control.
 //! - [`AugmentedLagrangian`] imposes the same constraints by repeated solves with [`Fddp`].
-//! - [`Sensitivity`] differentiates a solution with respect to initial state, targets, weights and other parameters, and
-//!   [`Sensitivities`] many solutions in SIMD lanes. A [`Parameter`] is a vector with a name, which
+//! - [`Sensitivity`] differentiates a solution with respect to initial state, targets, weights and other parameters,
+//!   and [`Sensitivities`] many solutions in SIMD lanes. A [`Parameter`] is a vector with a name, which
 //!   [`Problem::set_parameter`] sets without building the problem again.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
 //! - [`ControlRate`] adds a cost, and limits, of the change of the controls from knot to knot to any action.

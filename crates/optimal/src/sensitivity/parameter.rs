@@ -217,8 +217,8 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error::Sensitivity`] if the problem does not have the parameter, [`Error::Length`] for another number of
-    /// entries, [`Error::Parameter`] for invalid bounds, friction or numbers of a robot, and the errors of the setter of
-    /// the parameter.
+    /// entries, [`Error::Parameter`] for invalid bounds, friction or numbers of a robot, and the errors of the setter
+    /// of the parameter.
     pub fn set_parameter(&mut self, parameter: &Parameter, numbers: &[f64]) -> Result<(), Error> {
         let Some(nudge) = parameter.nudge(self)? else { return self.set_x0(numbers) };
         let expected = nudge.value_size();
