@@ -89,7 +89,8 @@ ARGUMENTS = {
         q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort
         Plan.controls corners durations normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
-        InteriorPoint.set_multipliers.values Problem.set_references.values Problem.set_placements.placements
+        InteriorPoint.set_multipliers.values Problem.set_parameter.values Problem.set_references.values
+        Problem.set_placements.placements
         rollout_many.us
         Problem.set_contact.kp Problem.set_entry_weights.weights ControlRate.weights by_xs""",
     "float | ArrayLike": "Problem.set_weight.weight",
@@ -101,6 +102,7 @@ ARGUMENTS = {
     "Sequence[Sensitivity]": "sensitivities",
     "Sequence[str]": "parameters Sensitivities.gradients.by_knot Sensitivity.gradients.by_knot",
     "tuple[Any, Any] | None": "_solve_many.start",
+    "Mapping[str, ArrayLike]": "Problem.set_parameters.values",
     "tuple[Callable[..., object], list[Any]] | None": "_solve_many.vary",
     "Callable[[int], object] | None": "_solve_many.report",
     "Model": "model",
@@ -285,7 +287,7 @@ RESULTS = {
         JointPolicy.__call__ Sensitivity.first_control_by_x0 Sensitivity.gradient WholeBodyMpc.forces
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Policy.__call__ Problem._between Problem.references
+        Policy.__call__ Problem._between Problem.parameter Problem.references
         AugmentedLagrangian.predict Fddp.predict InteriorPoint.predict Problem.rollout Problem.x0
         Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
@@ -356,7 +358,8 @@ RESULTS = {
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_contact Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot
-        Problem.set_knots Problem.set_references Problem.set_weight Problem.set_x0 Record.save Record.stop
+        Problem.set_knots Problem.set_parameter Problem.set_parameters Problem.set_references Problem.set_weight
+        Problem.set_x0 Record.save Record.stop
         Schedule.forget Schedule.switch Sensitivity.define Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "Plan": "WholeBodyMpc.plan",
@@ -392,7 +395,7 @@ RESULTS = {
     "Limits": "Model.limits",
     "Any": "Model.to_pinocchio _lend",
     "dict[str, _Array]": """
-        Model.keyframes Model.keyframe_velocities Model.keyframe_controls
+        Problem.parameter_values Model.keyframes Model.keyframe_velocities Model.keyframe_controls
         Model.reference_configurations Model.reference_configurations_str""",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",
@@ -412,6 +415,7 @@ RESULTS = {
     "tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]": "Record.start",
     "tuple[dict[str, Any], list[tuple[int, BaseException]]]": "_solve_many",
     "Evaluation": "Problem.evaluate Problem._evaluate",
+    "dict[str, int]": "Problem.parameters",
     "list[LqKnot]": "Problem.derivatives",
     "ManyRollouts": "rollout_many",
     "SweepResult": "Sweep.run",

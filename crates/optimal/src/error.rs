@@ -158,6 +158,15 @@ pub enum Error {
         what: String,
     },
 
+    /// A value of a parameter does not fit the problem.
+    #[error("parameter `{name}`: {what}")]
+    Parameter {
+        /// Name of the parameter.
+        name: String,
+        /// Description of the fault.
+        what: String,
+    },
+
     /// A limit does not fit the robot.
     #[error("limit `{name}`{}: {what}", at(*.knot))]
     Limit {

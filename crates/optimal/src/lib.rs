@@ -20,7 +20,9 @@
 //! - [`AugmentedLagrangian`] imposes the same constraints by repeated solves with [`Fddp`].
 //! - [`BatchFddp`] solves many problems, several at a time in SIMD lanes. [`OneByOne`] solves many problems by any of
 //!   these solvers, one at a time on each thread.
-//! - [`Sensitivity`] differentiates a solution with respect to initial state, targets, weights and other parameters.
+//! - [`Sensitivity`] differentiates a solution with respect to initial state, targets, weights and other parameters,
+//!   and [`Sensitivities`] many solutions in SIMD lanes. A [`Parameter`] is a vector with a name, which
+//!   [`Problem::set_parameter`] sets without building the problem again.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
 //! - [`ControlRate`] adds a cost, and limits, of the change of the controls from knot to knot to any action.
 //! - [`AutoDiff`] turns dynamics and a cost that are generic over the scalar type into an action with exact derivatives
@@ -104,7 +106,7 @@ pub use problem::{
     Lqr, NumDiff, PathConstraint, Problem, RolloutResults, Rollouts, Schedule, Unicycle,
 };
 pub use sensitivity::{
-    Adjoint, Curvature, Parameter, ParameterJacobian, Sensitivities, Sensitivity, SensitivityReport,
+    Adjoint, Curvature, Parameter, ParameterJacobian, ParameterValues, Sensitivities, Sensitivity, SensitivityReport,
     SensitivitySettings, SolutionJacobian, WeakestBound,
 };
 pub use solvers::{

@@ -8,14 +8,16 @@ mod constraints;
 mod faults;
 #[path = "sensitivity/many.rs"]
 mod many;
+#[path = "sensitivity/robots.rs"]
+mod robots_and_bounds;
 
 use common::{Cartpole, HANGING, Limited, cartpole_action, random, straight};
 use condyle_dynamics::{
-    ContactConstraint, Data, Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD, forward_kinematics, integrate,
-    neutral, robots,
+    ContactConstraint, Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, forward_kinematics,
+    integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, Integrator, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, Integrator, Limit, Residual,
 };
 use condyle_optimal::{
     ActionModel, Curvature, Fddp, Hessian, LqKnot, Parameter, ParameterJacobian, Problem, Sensitivity,
@@ -360,7 +362,11 @@ fn a_floating_base() {
 /// Creates the problem of a quadruped that stands and leans. The parameters are changes of the initial velocity of the
 /// base (6), of the height of one foothold, of the duration of all knots, and of the target's height.
 fn quadruped(p: &[f64]) -> Problem {
-    let model = Arc::new(robots::quadruped());
+    quadruped_with(Arc::new(robots::quadruped()), p, vec![])
+}
+
+/// Creates the problem of [`quadruped`] with another robot, and with limits.
+fn quadruped_with(model: Arc<Model>, p: &[f64], limits: Vec<Limit>) -> Problem {
     let mut q = neutral(&model);
     for leg in 0..4 {
         q[7 + 3 * leg + 1] = 0.6;
@@ -400,7 +406,8 @@ fn quadruped(p: &[f64]) -> Problem {
     };
     let mut running = costs(1.0);
     running.push(Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic));
-    let knot = ContactDynamics::running(model.clone(), &feet, 0.02 + p[7], running).unwrap();
+    let knot =
+        ContactDynamics::running(model.clone(), &feet, 0.02 + p[7], running).unwrap().with_limits(limits).unwrap();
     let end = FreeDynamics::terminal(model, costs(1.0)).unwrap();
     Problem::new(x0, vec![Box::new(knot)], vec![0; 8], Box::new(end)).unwrap()
 }

@@ -1,6 +1,7 @@
 //! Problems, made of actions of any kind.
 
 mod knot_models;
+mod parameters;
 
 use super::actions::terms;
 use super::costs::Cost;

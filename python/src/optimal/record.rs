@@ -255,6 +255,11 @@ impl<'py> Given<'_, 'py> {
                 to.set_item("weights", self.rows(knots, weights)?)?;
                 "set_entry_weights"
             }
+            Call::SetParameter { name, values } => {
+                to.set_item("parameter", name)?;
+                to.set_item("values", self.array(&[values.len()], values)?)?;
+                "set_parameter"
+            }
             Call::SetContact { contact, change } => {
                 to.set_item("contact", contact)?;
                 let six = |motion: &condyle::Motion<f64>| motion.to_array().as_slice().give(py, None);

@@ -13,9 +13,9 @@ use std::sync::Mutex;
 
 /// The derivatives of many solutions. Their adjoints are computed several at a time in the lanes of SIMD registers.
 ///
-/// The B problems have the same numbers of knots, states and controls. The results equal those of each `Sensitivity` up
-/// to rounding. Different controls may be at their bounds. The adjoint of a solution with active limits is computed
-/// alone.
+/// The B problems have the same numbers of knots, states and controls. The results equal the results of each
+/// `Sensitivity` up to rounding. Different controls may be at their bounds. The adjoint of a solution with active
+/// limits is computed alone.
 ///
 /// The derivatives with respect to parameters belong to the solved problems, one `Sensitivity` each. If the solutions
 /// are of one `Problem` whose parameters were set in between, call `Sensitivity.prepare` for the parameters before the
@@ -27,7 +27,8 @@ use std::sync::Mutex;
 ///
 /// >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivities, Sensitivity
 /// >>> arm = condyle.robots.arm7()
-/// >>> rest, effort = Cost("rest", 1.0, Residual.state(np.zeros(14))), Cost("effort", 0.1, Residual.control(np.zeros(7)))
+/// >>> rest = Cost("rest", 1.0, Residual.state(np.zeros(14)))
+/// >>> effort = Cost("effort", 0.1, Residual.control(np.zeros(7)))
 /// >>> knot, end = FreeDynamics(arm, 0.05, [rest, effort]), FreeDynamics(arm, None, [rest])
 /// >>> problem, each = Problem(np.zeros(14), [knot], [0] * 10, end), []
 /// >>> solver = Fddp(problem)

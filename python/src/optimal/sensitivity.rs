@@ -21,11 +21,10 @@ const MOST_ENTRIES: usize = 4096;
 /// The optimality conditions are linearised at the solution and factorised once. After that, the gradient of a loss
 /// with respect to a parameter is one pass over the knots, whatever the number of the parameter's entries.
 ///
-/// A parameter has a name. "x0" is the initial state, and "duration" is the duration of all knots. A cost NAME has the
-/// parameters "target/NAME", "weight/NAME" and "entry_weights/NAME", the weights of the entries of its residual.
-/// "contact/NAME" is the placement of a contact. A parameter that several knots share changes at all of them. Changes
-/// are in the tangent space: 2 nv numbers for a state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear
-/// first. `define` adds parameters of your own.
+/// A parameter has a name, such as "x0", "target/NAME" or "inertia/LINK"; `Problem.parameters` returns all names. A
+/// parameter that several knots share changes at all of them. Changes are in the tangent space: 2 nv numbers for a
+/// state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear first. Other parameters change by numbers that
+/// are added to their values. `define` adds parameters of your own.
 ///
 /// Bounds that are active are held active. If `report.strict_complementarity` is False, a bound is active with a
 /// multiplier near zero; the solution has a kink there, and the derivative on the other side differs.

@@ -212,6 +212,12 @@ pub trait KnotGroup {
         false
     }
 
+    /// Returns the lower and upper bounds on the controls, and the number of controls of the model. The bounds may
+    /// consist of several parts of this length.
+    fn bounds_mut(&mut self) -> Option<([&mut [f64]; 2], usize)> {
+        None
+    }
+
     /// Computes the next state of knot t after `dt` seconds in place of the knot's duration, into `next`. Returns
     /// whether the knot has a duration.
     fn advance(&mut self, t: usize, x: &[f64], u: &[f64], dt: f64, next: &mut [f64]) -> bool {

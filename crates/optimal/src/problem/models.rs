@@ -73,7 +73,7 @@ impl Models {
     }
 
     /// Makes the actions share scratch memory.
-    fn share(&mut self) {
+    pub(super) fn share(&mut self) {
         if let [first, others @ ..] = &mut self.actions[..] {
             others.iter_mut().for_each(|action| share(&**first, &mut **action));
         }

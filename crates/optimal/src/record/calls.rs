@@ -53,6 +53,13 @@ pub enum Call {
         /// Weights of the entries at all knots.
         weights: Numbers,
     },
+    /// Call of [`Problem::set_parameter`].
+    SetParameter {
+        /// Name of the parameter.
+        name: String,
+        /// Value of the parameter.
+        values: Numbers,
+    },
     /// Change of a contact, by [`Problem::change_contacts`].
     SetContact {
         /// Name of the contact.
@@ -208,6 +215,7 @@ impl Call {
             Self::SetWeight { name, weight } => problem.change_costs(name, |cost| cost.set_weight(*weight)).map(drop),
             Self::SetWeights { name, weights } => problem.set_weights(name, weights).map(drop),
             Self::SetEntryWeights { name, weights } => problem.set_entry_weights(name, weights).map(drop),
+            Self::SetParameter { name, values } => problem.set_parameter(&name.parse()?, values),
             Self::SetContact { contact, change } => {
                 problem.change_contacts(contact, |contact| change.apply(contact)).map(drop)
             }

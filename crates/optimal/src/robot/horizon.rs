@@ -4,7 +4,9 @@ use super::costs::{Cost, Costs, WeightedActivations, check_weight};
 use super::knot_data::{KnotState, Sensitivities};
 use super::limits::{Limit, Limits};
 use super::outputs::Capabilities;
+use super::residuals::cones::FrictionCone;
 use super::residuals::layout::KnotLayout;
+use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, KnotTerms};
 use super::residuals::view::{ResidualView, Scratch};
 use crate::Error;
@@ -213,6 +215,37 @@ impl HorizonTerms {
     pub(crate) fn require(&mut self, limits: Vec<Limit>) -> Result<(), Error> {
         self.limits = Limits::asked_for(limits);
         self.set_limits(None, Vec::new())
+    }
+
+    /// Replaces the robot by one that differs only in its numbers.
+    pub(crate) fn set_model(&mut self, model: &Arc<Model>) {
+        self.model = model.clone();
+        self.every_cost().for_each(|costs| costs.model = model.clone());
+        self.scratch = None;
+    }
+
+    /// Returns the costs of all knots and all models.
+    fn every_cost(&mut self) -> impl Iterator<Item = &mut Costs> {
+        self.costs.all_mut().iter_mut().flat_map(PerKnot::all_mut)
+    }
+
+    /// Calls `change` with the friction cone of each limit and each cost called `name`. Returns whether one exists.
+    pub(super) fn change_friction(&mut self, name: &str, change: &mut dyn FnMut(&mut FrictionCone)) -> bool {
+        let mut found = self.limits.change_friction(name, change);
+        for (cost, plan) in self.every_cost().flat_map(|costs| costs.terms.with_plans_mut()) {
+            if cost.name == name {
+                found |= cost.residual.change_friction(plan.rows.len(), &mut plan.W, change);
+            }
+        }
+        found
+    }
+
+    /// Calls `visit` with the residual of each cost and each limit, with its name, and the cost if it is one.
+    pub(crate) fn visit_terms(&mut self, visit: &mut dyn FnMut(&str, &Residual, Option<&Cost>)) {
+        for cost in self.costs.all().iter().flat_map(PerKnot::all).flat_map(Costs::terms) {
+            visit(&cost.name, &cost.residual, Some(cost));
+        }
+        self.limits.visit_terms(&mut |name, residual| visit(name, residual, None));
     }
 
     /// Returns the costs of knot t; for `None`, the common costs of all knots without separate costs.

@@ -3,6 +3,7 @@
 use super::horizon::{PerKnot, PerModel};
 use super::knot_data::Sensitivities;
 use super::outputs::Capabilities;
+use super::residuals::cones::FrictionCone;
 use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
@@ -243,6 +244,25 @@ impl Limits {
             }
         }
         Ok(found)
+    }
+
+    /// Calls `change` with the friction cone of each limit called `name`, at all knots of all models. Returns whether
+    /// there is such a limit.
+    pub(super) fn change_friction(&mut self, name: &str, change: &mut dyn FnMut(&mut FrictionCone)) -> bool {
+        let mut found = false;
+        for set in self.sets.all_mut().iter_mut().flat_map(PerKnot::all_mut) {
+            for (limit, plan) in set.terms.with_plans_mut().filter(|(limit, _)| limit.name == name) {
+                found |= limit.residual.change_friction(plan.rows.len(), &mut plan.W, change);
+            }
+        }
+        found
+    }
+
+    /// Calls `visit` with the name and the residual of each limit.
+    pub(super) fn visit_terms(&self, visit: &mut dyn FnMut(&str, &Residual)) {
+        for limit in self.all().flat_map(|set| set.terms.all()) {
+            visit(&limit.name, &limit.residual);
+        }
     }
 
     /// Returns the limit sets of the knots of the chosen model.

@@ -71,6 +71,7 @@ mod own_constraint;
 mod problem;
 mod references;
 mod residuals;
+mod robot_numbers;
 mod state;
 
 pub use crate::problem::Soft;
@@ -100,4 +101,5 @@ pub use residuals::cones::{FrictionCone, WrenchCone};
 pub use residuals::own::{Inputs, OwnResidual, ResidualFunction};
 pub use residuals::residual::Residual;
 pub use residuals::target::Target;
+pub(crate) use robot_numbers::{RobotNumbers, parameter_names};
 pub use state::groups;

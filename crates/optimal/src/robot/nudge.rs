@@ -3,8 +3,10 @@
 use super::cost_access::CostMut;
 use super::residuals::residual::Residual;
 use super::residuals::target::Target;
+use super::robot_numbers::RobotNumbers;
 use crate::{Error, Problem};
 use condyle_dynamics::{Model, Motion, Se3, integrate, lie};
+use std::sync::Arc;
 
 /// Step of central differences, where truncation and rounding errors of a function of size 1 are about equal.
 const STEP: f64 = 6e-6;
@@ -18,23 +20,29 @@ pub(crate) struct Nudge {
     values: Vec<Vec<f64>>,
     /// Placements of each contact, in the order of visits.
     placements: Vec<Se3<f64>>,
+    /// Robots, in the order of visits.
+    robots: Vec<Arc<Model>>,
     size: usize,
 }
 
 /// Kind of a parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum Kind {
     Target,
     Weight,
     EntryWeights,
     Contact,
     Duration,
+    /// Lower bounds on controls, or the upper ones if set.
+    Bounds(bool),
+    Friction,
+    Robot(RobotNumbers),
 }
 
 impl Nudge {
     /// Reads the targets of a cost; `None` if the cost does not exist.
     pub(crate) fn target(problem: &mut Problem, name: &str) -> Result<Option<Self>, Error> {
-        Self::of_costs(problem, name, Kind::Target, |cost| {
+        Self::of_costs(problem, name, &Kind::Target, |cost| {
             let target = cost.target().ok_or_else(|| lacks(cost, "target"))?;
             let mut numbers = vec![0.0; target.size()];
             target.write(&mut numbers);
@@ -45,12 +53,12 @@ impl Nudge {
 
     /// Reads the weights of a cost; `None` if the cost does not exist.
     pub(crate) fn weight(problem: &mut Problem, name: &str) -> Result<Option<Self>, Error> {
-        Self::of_costs(problem, name, Kind::Weight, |cost| Ok((vec![cost.get().weight], 1)))
+        Self::of_costs(problem, name, &Kind::Weight, |cost| Ok((vec![cost.get().weight], 1)))
     }
 
     /// Reads the weights of the entries of a cost; `None` if the cost does not exist.
     pub(crate) fn entry_weights(problem: &mut Problem, name: &str) -> Result<Option<Self>, Error> {
-        Self::of_costs(problem, name, Kind::EntryWeights, |cost| {
+        Self::of_costs(problem, name, &Kind::EntryWeights, |cost| {
             let weights = cost.get().activation.weights().ok_or_else(|| lacks(cost, "weights of entries"))?;
             Ok((weights.to_vec(), weights.len()))
         })
@@ -61,8 +69,7 @@ impl Nudge {
         let mut placements = Vec::new();
         problem.change_contacts(name, |contact| placements.push(contact.target.placement))?;
         let found = !placements.is_empty();
-        let (name, values) = (name.to_owned(), Vec::new());
-        Ok(found.then_some(Self { name, kind: Kind::Contact, values, placements, size: 6 }))
+        Ok(found.then_some(Self { placements, ..Self::new(name, Kind::Contact, Vec::new(), 6) }))
     }
 
     /// Reads the durations of the knots; `None` if no knot has a duration.
@@ -70,15 +77,54 @@ impl Nudge {
         let seconds = |t| problem.duration(t).unwrap_or(0.0);
         let values: Vec<Vec<f64>> = (0..problem.horizon()).map(|t| vec![seconds(t)]).collect();
         let found = values.iter().any(|dt| dt[0] > 0.0);
-        let (name, placements) = (String::new(), Vec::new());
-        Ok(found.then_some(Self { name, kind: Kind::Duration, values, placements, size: 1 }))
+        Ok(found.then_some(Self::new("", Kind::Duration, values, 1)))
+    }
+
+    /// Reads the lower bounds on controls, or the upper ones if `upper` is set; `None` without bounds.
+    pub(crate) fn bounds(problem: &mut Problem, upper: bool) -> Result<Option<Self>, Error> {
+        let mut values: Vec<Vec<f64>> = Vec::new();
+        let found = problem.change_bounds(&mut |bounds| values.push(bounds[usize::from(upper)].to_vec()));
+        let size = values.first().map_or(0, Vec::len);
+        if let Some(other) = values.iter().find(|other| other.len() != size) {
+            let what = format!("knots have bounds on {size} and on {} controls, expected the same number", other.len());
+            return Err(Error::Parameter {
+                name: if upper { "bounds/upper" } else { "bounds/lower" }.to_owned(),
+                what,
+            });
+        }
+        Ok(found.then(|| Self::new("", Kind::Bounds(upper), values, size)))
+    }
+
+    /// Reads the coefficient of friction of cones; `None` if no limit and no cost with this name is a cone.
+    pub(crate) fn friction(problem: &mut Problem, name: &str) -> Result<Option<Self>, Error> {
+        let mut values = Vec::new();
+        let found = problem.change_friction(name, &mut |cone| values.push(vec![cone.mu]));
+        Ok(found.then(|| Self::new(name, Kind::Friction, values, 1)))
+    }
+
+    /// Reads numbers of the robots; `None` without a robot that has them.
+    pub(crate) fn robot(problem: &mut Problem, numbers: RobotNumbers) -> Result<Option<Self>, Error> {
+        let (mut values, mut robots) = (Vec::new(), Vec::new());
+        problem.change_robots(&mut |model| {
+            values.extend(numbers.of(model));
+            robots.push(model.clone());
+            Ok(model.clone())
+        })?;
+        let found =
+            !values.is_empty() && values.len() == robots.len() && values.iter().all(|v| v.len() == values[0].len());
+        let size = values.first().map_or(0, Vec::len);
+        Ok(found.then(|| Self { robots, ..Self::new("", Kind::Robot(numbers), values, size) }))
+    }
+
+    fn new(name: &str, kind: Kind, values: Vec<Vec<f64>>, size: usize) -> Self {
+        Self { name: name.to_owned(), kind, values, placements: Vec::new(), robots: Vec::new(), size }
     }
 
     /// Reads the values of all costs with a name, and the size of their changes, which must be the same.
     fn of_costs(
         problem: &mut Problem,
         name: &str,
-        kind: Kind,
+        kind: &Kind,
         read: impl Fn(&CostMut<'_>) -> Result<(Vec<f64>, usize), Error>,
     ) -> Result<Option<Self>, Error> {
         let (mut values, mut sizes) = (Vec::new(), Vec::new());
@@ -92,8 +138,7 @@ impl Nudge {
             sizes.push(size);
             Ok(())
         })?;
-        let (name, placements) = (name.to_owned(), Vec::new());
-        Ok(found.then(|| Self { name, kind, values, placements, size: sizes[0] }))
+        Ok(found.then(|| Self::new(name, kind.clone(), values, sizes[0])))
     }
 
     /// Returns the value, if it is the same everywhere; `None` if it differs.
@@ -115,7 +160,7 @@ impl Nudge {
 
     /// Sets the parameter to the same value everywhere.
     pub(crate) fn set(&self, problem: &mut Problem, numbers: &[f64]) -> Result<(), Error> {
-        match self.kind {
+        match &self.kind {
             Kind::Target => problem.change_costs(&self.name, |cost| cost.set_target_numbers(numbers))?,
             Kind::Weight => problem.change_costs(&self.name, |cost| cost.set_weight(numbers[0]))?,
             Kind::EntryWeights => problem.change_costs(&self.name, |cost| cost.set_entry_weights(numbers))?,
@@ -133,6 +178,29 @@ impl Nudge {
                 }
                 true
             }
+            Kind::Bounds(upper) => {
+                let side = usize::from(*upper);
+                let mut fits = !numbers.iter().any(|x| x.is_nan());
+                problem.change_bounds(&mut |bounds| {
+                    let pair = |(i, x): (usize, &f64)| if *upper { bounds[0][i] <= *x } else { *x <= bounds[1][i] };
+                    fits &= numbers.iter().enumerate().all(pair);
+                });
+                if !fits {
+                    let name = if *upper { "bounds/upper" } else { "bounds/lower" }.to_owned();
+                    let what = "expected numbers with each lower bound at most the upper one".to_owned();
+                    return Err(Error::Parameter { name, what });
+                }
+                problem.change_bounds(&mut |bounds| bounds[side].copy_from_slice(numbers))
+            }
+            Kind::Friction => {
+                let mu = numbers[0];
+                if !(mu >= 0.0 && mu.is_finite()) {
+                    let what = format!("expected a finite coefficient of at least 0, found {mu}");
+                    return Err(Error::Parameter { name: format!("friction/{}", self.name), what });
+                }
+                problem.change_friction(&self.name, &mut |cone| cone.mu = mu)
+            }
+            Kind::Robot(kind) => problem.change_robots(&mut |model| replaced(kind, model, numbers))?,
         };
         Ok(())
     }
@@ -147,14 +215,18 @@ impl Nudge {
         matches!(self.kind, Kind::Weight | Kind::EntryWeights)
     }
 
-    /// Returns the step of differences: of the size of the weights, as they are linear, or a small one.
-    pub(crate) fn step(&self) -> f64 {
-        match self.kind {
+    /// Returns the step of differences of an entry: of the size of the weights, as they are linear, or a small one.
+    pub(crate) fn step(&self, entry: usize) -> f64 {
+        match &self.kind {
             Kind::Weight | Kind::EntryWeights => 1.0 + self.values.iter().flatten().fold(0.0_f64, |a, w| a.max(*w)),
             Kind::Duration => {
                 self.values.iter().flatten().filter(|dt| **dt > 0.0).fold(1.0_f64, |a, dt| a.min(*dt)) * STEP
             }
-            Kind::Target | Kind::Contact => STEP,
+            Kind::Target | Kind::Contact | Kind::Bounds(_) | Kind::Friction => STEP,
+            Kind::Robot(numbers) => {
+                let scales = self.values.iter().map(|values| numbers.scales(values)[entry]);
+                scales.fold(f64::INFINITY, f64::min) * STEP
+            }
         }
     }
 
@@ -162,7 +234,7 @@ impl Nudge {
     pub(crate) fn apply(&self, problem: &mut Problem, entry: usize, step: f64) -> Result<(), Error> {
         let mut visits = self.values.iter();
         let mut next = || visits.next().expect("the visits are the same as at the beginning");
-        match self.kind {
+        match &self.kind {
             Kind::Target => problem.change_costs(&self.name, |cost| {
                 let moved = moved_target(cost, next(), entry, step);
                 cost.set_target_numbers(&moved)
@@ -190,6 +262,20 @@ impl Nudge {
                 }
                 true
             }
+            Kind::Bounds(upper) => problem.change_bounds(&mut |mut bounds| {
+                let to = &mut bounds[usize::from(*upper)];
+                to.copy_from_slice(next());
+                to[entry] += step;
+            }),
+            Kind::Friction => problem.change_friction(&self.name, &mut |cone| cone.mu = next()[0] + step),
+            Kind::Robot(kind) => {
+                let mut robots = self.robots.iter();
+                problem.change_robots(&mut |_| {
+                    let (own, mut numbers) = (robots.next().expect("the visits are the same"), next().clone());
+                    numbers[entry] += step;
+                    if step == 0.0 { Ok(own.clone()) } else { replaced(kind, own, &numbers) }
+                })?
+            }
         };
         Ok(())
     }
@@ -198,6 +284,16 @@ impl Nudge {
     pub(crate) fn restore(&self, problem: &mut Problem) -> Result<(), Error> {
         self.apply(problem, 0, 0.0)
     }
+}
+
+/// Returns the robot with other numbers, in the memory of a problem.
+fn replaced(kind: &RobotNumbers, model: &Model, numbers: &[f64]) -> Result<Arc<Model>, Error> {
+    let name = match kind {
+        RobotNumbers::Inertia(link) => format!("inertia/{link}"),
+        RobotNumbers::Gravity => "gravity".to_owned(),
+        RobotNumbers::Armature => "armature".to_owned(),
+    };
+    kind.with(model, numbers).map(Arc::new).map_err(|error| Error::Parameter { name, what: error.to_string() })
 }
 
 /// Returns the error for a cost without the given property.

@@ -60,41 +60,24 @@ impl KnotLayout {
         [A, B, K, L, P, P + ndx * (ndx + 1) / 2]
     }
 
-    /// Writes the factors of one solution to its lane.
-    fn write(&self, factor: &KnotFactor, structure: &DynamicsStructure, to: &mut [f64], lane: usize, lanes: usize) {
+    /// Appends the factors of one solution, in the order of the layout.
+    fn append(&self, factor: &KnotFactor, structure: &DynamicsStructure, to: &mut Vec<f64>) {
         let KnotFactor { A, B, K, L, P, .. } = factor;
-        let [offsets @ .., _] = self.offsets();
-        let mut write = |at: usize, x: f64| to[at * lanes + lane] = x;
-        if let Some((dt, blocks)) = structure.euler() {
-            write(self.start, dt);
-            let numbers = blocks.iter().flat_map(|block| block.T.iter().chain(block.E.iter()));
-            for (at, x) in (self.start + 1..).zip(numbers) {
-                write(at, *x);
-            }
+        let euler = structure.euler();
+        to.push(euler.map_or(0.0, |(dt, _)| dt));
+        for block in euler.iter().flat_map(|(_, blocks)| *blocks) {
+            to.extend(block.T.iter().chain(&block.E));
         }
         let top = self.ndx - self.rows;
-        for (first, matrix) in offsets.into_iter().zip([A, B]) {
-            for (at, x) in (first..).zip(matrix.rows(top, self.rows).iter()) {
-                write(at, *x);
-            }
-        }
-        for (at, x) in (offsets[2]..).zip(K.iter()) {
-            write(at, *x);
-        }
-        let lower = |of: &nalgebra::DMatrix<f64>, j: usize| of.column(j).rows(j, of.nrows() - j).clone_owned();
-        let mut at = offsets[3];
+        to.extend(A.rows(top, self.rows).iter().chain(&B.rows(top, self.rows)));
+        to.extend_from_slice(K.as_slice());
         for j in 0..self.nu {
-            for (i, x) in lower(L, j).iter().enumerate() {
-                write(at, if i == 0 { 1.0 / x } else { *x });
-                at += 1;
-            }
+            let column = &L.as_slice()[j * self.nu..][j..self.nu];
+            to.push(1.0 / column[0]);
+            to.extend_from_slice(&column[1..]);
         }
-        let mut at = offsets[4];
         for j in 0..self.ndx {
-            for x in &lower(P, j) {
-                write(at, *x);
-                at += 1;
-            }
+            to.extend_from_slice(&P.as_slice()[j * self.ndx..][j..self.ndx]);
         }
     }
 }
@@ -106,7 +89,11 @@ pub(super) struct Group {
     pub(super) members: Vec<usize>,
     lanes: usize,
     layout: Vec<KnotLayout>,
+    /// Factors of each solution, until they are packed.
+    rows: Vec<Vec<f64>>,
+    /// Factors of all solutions, side by side, and whether they are up to date.
     numbers: Aligned,
+    is_packed: bool,
     vectors: LaneVectors,
 }
 
@@ -141,7 +128,8 @@ impl Group {
             states: zeros(states),
             scratch: zeros(shape.ndx),
         };
-        Self { members: Vec::with_capacity(lanes), lanes, layout, numbers: zeros(start), vectors }
+        let (members, rows, numbers) = (Vec::with_capacity(lanes), Vec::with_capacity(lanes), zeros(start));
+        Self { members, lanes, layout, rows, numbers, is_packed: false, vectors }
     }
 
     /// Adds solution `index`. Returns whether the group has a free lane and the layout of the factors.
@@ -153,9 +141,12 @@ impl Group {
         if self.members.len() == self.lanes || !self.layout.iter().zip(pairs()).all(fits) {
             return false;
         }
+        let mut row = Vec::with_capacity(self.numbers.len() / self.lanes);
         for (knot, (factor, structure)) in self.layout.iter().zip(pairs()) {
-            knot.write(factor, structure, &mut self.numbers, self.members.len(), self.lanes);
+            knot.append(factor, structure, &mut row);
         }
+        self.rows.push(row);
+        self.is_packed = false;
         self.members.push(index);
         true
     }
@@ -168,6 +159,7 @@ impl Group {
         by_controls: &[&[f64]],
         held: impl Iterator<Item = (usize, usize)>,
     ) {
+        self.pack();
         let Self { lanes, layout, numbers, vectors, .. } = self;
         let LaneVectors { x_duals, controls, .. } = vectors;
         in_lanes(*lanes, Task::Gather(by_states, x_duals));
@@ -176,6 +168,19 @@ impl Group {
             controls[i * *lanes + lane] = 0.0;
         }
         in_lanes(*lanes, Task::Pass(layout, numbers, vectors));
+    }
+
+    /// Writes the factors of all solutions side by side, unless this is done already. A full group keeps no copies.
+    fn pack(&mut self) {
+        if self.is_packed {
+            return;
+        }
+        let rows: Vec<&[f64]> = self.rows.iter().map(Vec::as_slice).collect();
+        in_lanes(self.lanes, Task::Gather(&rows, &mut self.numbers));
+        self.is_packed = true;
+        if self.members.len() == self.lanes {
+            self.rows = Vec::new();
+        }
     }
 
     /// Writes ξ, υ and η of each solution: numbers for all states, controls and states.

@@ -10,6 +10,7 @@ mod curvature;
 mod forward;
 mod lanes;
 mod many;
+mod parameter;
 mod parameters;
 mod point;
 mod report;
@@ -18,7 +19,8 @@ mod system;
 pub use adjoint::Adjoint;
 pub use forward::SolutionJacobian;
 pub use many::Sensitivities;
-pub use parameters::{Parameter, ParameterJacobian};
+pub use parameter::{Parameter, ParameterValues};
+pub use parameters::ParameterJacobian;
 pub use report::{Curvature, SensitivityReport, SensitivitySettings, WeakestBound};
 
 use crate::error::Error;

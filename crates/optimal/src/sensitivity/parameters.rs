@@ -1,135 +1,14 @@
-//! Parameters of a problem, and the derivatives of its optimality conditions with respect to them.
+//! Derivatives of the optimality conditions of a problem with respect to its parameters.
 
+use super::parameter::Parameter;
 use super::point::{Active, Point};
 use super::system::{Vectors, slice};
 use super::wrong;
 use crate::error::{Error, assert_length};
 use crate::problem::{Problem, Shape};
 use crate::robot::Nudge;
-use core::fmt;
-use core::str::FromStr;
+use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
-
-/// Parameter of a problem, which has a name: `x0`, or the kind and the name of a cost or contact, such as
-/// `target/reach`. A parameter that several knots share changes at all of them.
-///
-/// ```
-/// use condyle_optimal::Parameter;
-/// assert_eq!("target/reach".parse(), Ok(Parameter::Target("reach".into())));
-/// assert_eq!(Parameter::Weight("effort".into()).to_string(), "weight/effort");
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Parameter {
-    /// Initial state x̂₀, `x0`. Its changes are in the tangent space, ndx numbers.
-    InitialState,
-    /// Target of the cost with this name, `target/NAME`. A reference state changes in its tangent space (2 nv numbers),
-    /// a rotation R by R exp(δ) (3 numbers), a placement M by M exp(δ) (6 numbers, linear first).
-    Target(String),
-    /// Weight of the cost with this name, `weight/NAME`, 1 number.
-    Weight(String),
-    /// Weights of the entries of the residual of the cost with this name, `entry_weights/NAME`.
-    EntryWeights(String),
-    /// Placement M at which the contact with this name is held, `contact/NAME`. It changes by M exp(δ), 6 numbers,
-    /// linear first. It has an effect only if the contact has a gain of the position error.
-    Contact(String),
-    /// Duration of all knots of a robot that have one, `duration`, 1 number (s). All change by the same amount.
-    Duration,
-}
-
-impl fmt::Display for Parameter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::InitialState => f.write_str("x0"),
-            Self::Target(name) => write!(f, "target/{name}"),
-            Self::Weight(name) => write!(f, "weight/{name}"),
-            Self::EntryWeights(name) => write!(f, "entry_weights/{name}"),
-            Self::Contact(name) => write!(f, "contact/{name}"),
-            Self::Duration => f.write_str("duration"),
-        }
-    }
-}
-
-impl FromStr for Parameter {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        let named = |name: &str| name.to_owned();
-        match text.split_once('/') {
-            None if text == "x0" => Ok(Self::InitialState),
-            None if text == "duration" => Ok(Self::Duration),
-            Some(("target", name)) => Ok(Self::Target(named(name))),
-            Some(("weight", name)) => Ok(Self::Weight(named(name))),
-            Some(("entry_weights", name)) => Ok(Self::EntryWeights(named(name))),
-            Some(("contact", name)) => Ok(Self::Contact(named(name))),
-            _ => Err(wrong(format!(
-                "`{text}` is no parameter; expected `x0`, `duration`, `target/NAME`, `weight/NAME`, \
-                 `entry_weights/NAME` or `contact/NAME`"
-            ))),
-        }
-    }
-}
-
-impl Parameter {
-    /// Reads the parameter of a robot's problem; `None` for the initial state.
-    fn nudge(&self, problem: &mut Problem) -> Result<Option<Nudge>, Error> {
-        let nudge = match self {
-            Self::InitialState => return Ok(None),
-            Self::Target(name) => Nudge::target(problem, name),
-            Self::Weight(name) => Nudge::weight(problem, name),
-            Self::EntryWeights(name) => Nudge::entry_weights(problem, name),
-            Self::Contact(name) => Nudge::contact(problem, name),
-            Self::Duration => Nudge::duration(problem),
-        };
-        nudge?.map(Some).ok_or_else(|| wrong(format!("the problem does not have the parameter `{self}`")))
-    }
-}
-
-/// Named parameters as vectors.
-impl Problem {
-    /// Returns the value of a parameter: the initial state (nx), a target in the form of
-    /// [`set_references`](Self::set_references), a weight, the weights of entries, the placement of a contact as a
-    /// homogeneous matrix (16 numbers, row by row), or a duration (s). Allocates.
-    ///
-    /// # Errors
-    /// [`Error::Sensitivity`] if the problem does not have the parameter, or if its value differs from knot to knot.
-    pub fn parameter(&mut self, parameter: &Parameter) -> Result<Vec<f64>, Error> {
-        match parameter.nudge(self)? {
-            None => Ok(self.x0().to_vec()),
-            Some(nudge) => {
-                nudge.value().ok_or_else(|| wrong(format!("the value of `{parameter}` differs from knot to knot")))
-            }
-        }
-    }
-
-    /// Sets a parameter to a value, in the form that [`parameter`](Self::parameter) returns, at all knots that have it.
-    /// The problem is not built again, and solvers continue with it.
-    ///
-    /// ```
-    /// # use condyle_dynamics::{Vec3, robots};
-    /// # use condyle_optimal::Problem;
-    /// # use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
-    /// # let arm = std::sync::Arc::new(robots::arm7());
-    /// # let reach = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
-    /// # let costs = vec![Cost::new("reach", 1.0, reach, Activation::Quadratic)];
-    /// # let knot = FreeDynamics::running(arm.clone(), 0.02, costs.clone())?;
-    /// # let end = FreeDynamics::terminal(arm, costs)?;
-    /// # let mut problem = Problem::new(vec![0.0; 14], vec![Box::new(knot)], vec![0; 20], Box::new(end))?;
-    /// problem.set_parameter(&"target/reach".parse()?, &[0.3, 0.2, 0.5])?;
-    /// assert_eq!(problem.parameter(&"target/reach".parse()?)?, [0.3, 0.2, 0.5]);
-    /// # Ok::<(), condyle_optimal::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`Error::Sensitivity`] if the problem does not have the parameter, [`Error::Length`] for another number of
-    /// entries, and the errors of the setter of the parameter.
-    pub fn set_parameter(&mut self, parameter: &Parameter, numbers: &[f64]) -> Result<(), Error> {
-        let Some(nudge) = parameter.nudge(self)? else { return self.set_x0(numbers) };
-        let expected = nudge.value_size();
-        Error::check("numbers", numbers, expected)?;
-        nudge.set(self, numbers)
-    }
-}
 
 /// Derivatives of the optimality conditions of all knots with respect to one parameter.
 #[derive(Debug, Clone)]
@@ -141,19 +20,74 @@ pub struct ParameterJacobian {
     knots: Vec<Option<KnotJacobian>>,
 }
 
-/// Derivatives of one knot with respect to a parameter, with a column for each entry; `None` for zeros.
+/// Derivatives of one knot with respect to a parameter, with a column for each entry.
 #[derive(Debug, Clone)]
 struct KnotJacobian {
     /// Derivatives of ∇Lₜ, ndx + nu rows.
-    gradient: Option<DMatrix<f64>>,
+    gradient: Columns,
     /// Derivatives of φₜ, ndx rows; empty at the terminal knot.
-    next: Option<DMatrix<f64>>,
+    next: Columns,
     /// Derivatives of the active rows minus their bounds.
-    rows: Option<DMatrix<f64>>,
+    rows: Columns,
     /// Derivatives of the active bounds on controls.
-    bounds: Option<DMatrix<f64>>,
+    bounds: Columns,
     /// Number of active rows, and of active bounds on controls.
     active: [usize; 2],
+}
+
+/// Matrix whose columns often have few entries that are not zero, such as the derivatives with respect to a target.
+#[derive(Debug, Clone, Default)]
+struct Columns {
+    /// Range of the rows of each column outside which all entries are zero.
+    ranges: Vec<Range<usize>>,
+    /// Entries in these ranges, column after column.
+    entries: Vec<f64>,
+    /// Offset of each column in the entries.
+    starts: Vec<usize>,
+}
+
+impl KnotJacobian {
+    /// Creates derivatives whose first `zeros` columns are zero.
+    fn new(active: [usize; 2], zeros: usize) -> Self {
+        let empty = || Columns { ranges: vec![0..0; zeros], entries: Vec::new(), starts: vec![0; zeros] };
+        Self { gradient: empty(), next: empty(), rows: empty(), bounds: empty(), active }
+    }
+}
+
+impl Columns {
+    /// Appends a column.
+    fn push(&mut self, column: &DVector<f64>) {
+        let first = column.iter().position(|x| *x != 0.0).unwrap_or(0);
+        let end = column.iter().rposition(|x| *x != 0.0).map_or(first, |last| last + 1);
+        self.starts.push(self.entries.len());
+        self.ranges.push(first..end);
+        self.entries.extend_from_slice(&column.as_slice()[first..end]);
+    }
+
+    /// Returns column j: the range of its rows, and its entries there. A column that does not exist is zero.
+    fn column(&self, j: usize) -> (Range<usize>, &[f64]) {
+        let Some(range) = self.ranges.get(j) else { return (0..0, &[]) };
+        (range.clone(), &self.entries[self.starts[j]..][..range.len()])
+    }
+
+    /// Returns column j as `rows` numbers.
+    fn dense(&self, j: usize, rows: usize) -> Vec<f64> {
+        let (mut all, (range, entries)) = (vec![0.0; rows], self.column(j));
+        all[range].copy_from_slice(entries);
+        all
+    }
+
+    /// Subtracts the products of all columns with the numbers of the rows from `first` on.
+    fn subtract_products(&self, first: usize, numbers: &[f64], to: &mut [f64]) {
+        for (j, to) in to.iter_mut().enumerate().take(self.ranges.len()) {
+            let (Range { start, end }, entries) = self.column(j);
+            let (from, until) = (start.max(first), end.min(first + numbers.len()));
+            if from < until {
+                let pairs = entries[from - start..until - start].iter().zip(&numbers[from - first..until - first]);
+                *to -= pairs.map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+    }
 }
 
 impl ParameterJacobian {
@@ -172,24 +106,21 @@ impl ParameterJacobian {
     pub(super) fn subtract_products(&self, shape: &Shape, t: usize, adjoint: &Vectors, kappa: &[f64], to: &mut [f64]) {
         let Vectors { x, u, dynamics: eta, rows } = adjoint;
         assert_length("knots of the parameter's Jacobian", self.knots.len(), shape.horizon() + 1);
-        let mut subtract = |J: Option<&DMatrix<f64>>, first: usize, numbers: &[f64]| {
-            for (to, column) in to.iter_mut().zip(J.iter().flat_map(|J| J.column_iter())) {
-                *to -= column.rows(first, numbers.len()).dot(&slice(numbers));
-            }
-        };
         if t == 0 {
-            subtract(Some(&self.initial), 0, &eta[shape.dx(0)]);
+            for (to, column) in to.iter_mut().zip(self.initial.column_iter()) {
+                *to -= column.dot(&slice(&eta[shape.dx(0)]));
+            }
         }
         let Some(knot) = &self.knots[t] else { return };
         assert_length("active rows of the parameter's Jacobian", knot.active[0], rows[t].len());
         assert_length("active bounds of the parameter's Jacobian", knot.active[1], kappa.len());
-        subtract(knot.gradient.as_ref(), 0, &x[shape.dx(t)]);
-        subtract(knot.gradient.as_ref(), shape.ndx, &u[shape.u(t)]);
+        knot.gradient.subtract_products(0, &x[shape.dx(t)], to);
+        knot.gradient.subtract_products(shape.ndx, &u[shape.u(t)], to);
         if t < shape.horizon() {
-            subtract(knot.next.as_ref(), 0, &eta[shape.dx(t + 1)]);
+            knot.next.subtract_products(0, &eta[shape.dx(t + 1)], to);
         }
-        subtract(knot.rows.as_ref(), 0, rows[t].as_slice());
-        subtract(knot.bounds.as_ref(), 0, kappa);
+        knot.rows.subtract_products(0, rows[t].as_slice(), to);
+        knot.bounds.subtract_products(0, kappa, to);
     }
 
     /// Writes the right-hand sides of the linearised optimality conditions for entry j. Returns the derivatives of the
@@ -199,23 +130,16 @@ impl ParameterJacobian {
         given.dynamics[..ndx].copy_from_slice(self.initial.column(j).as_slice());
         let write = |(t, knot): (usize, &Option<KnotJacobian>)| {
             let Some(knot) = knot else { return Vec::new() };
-            if let Some(gradient) = &knot.gradient {
-                let column = gradient.column(j);
-                let (by_x, by_u) = column.as_slice().split_at(ndx);
-                let negate = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(to, from)| *to = -from);
-                negate(&mut given.x[shape.dx(t)], by_x);
-                negate(&mut given.u[shape.u(t)], by_u);
+            let column = knot.gradient.dense(j, ndx + shape.nu(t));
+            let (by_x, by_u) = column.split_at(ndx);
+            let negate = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(to, from)| *to = -from);
+            negate(&mut given.x[shape.dx(t)], by_x);
+            negate(&mut given.u[shape.u(t)], by_u);
+            if t < shape.horizon() {
+                given.dynamics[shape.dx(t + 1)].copy_from_slice(&knot.next.dense(j, ndx));
             }
-            if let Some(next) = &knot.next {
-                given.dynamics[shape.dx(t + 1)].copy_from_slice(next.column(j).as_slice());
-            }
-            if let Some(rows) = &knot.rows {
-                given.rows[t].copy_from(&rows.column(j));
-            }
-            match &knot.bounds {
-                Some(bounds) => bounds.column(j).iter().copied().collect(),
-                None => vec![0.0; knot.active[1]],
-            }
+            given.rows[t].copy_from_slice(&knot.rows.dense(j, knot.active[0]));
+            knot.bounds.dense(j, knot.active[1])
         };
         self.knots.iter().enumerate().map(write).collect()
     }
@@ -305,8 +229,7 @@ impl<'a> Differences<'a> {
         let brackets: Vec<DVector<f64>> = (0..self.point.shape.horizon())
             .map(|t| self.brackets(problem, t, ((&above.gaps[t + 1] - &below.gaps[t + 1]) / span).as_slice()))
             .collect();
-        let Self { point, jacobian: ParameterJacobian { size, initial, knots }, .. } = self;
-        let zeros = |rows: usize| DMatrix::zeros(rows, *size);
+        let Self { point, jacobian: ParameterJacobian { initial, knots, .. }, .. } = self;
         let slope = |a: &[DVector<f64>], b: &[DVector<f64>], t: usize| match (a.get(t), b.get(t)) {
             (Some(a), Some(b)) => (a - b) / span,
             _ => DVector::zeros(0),
@@ -321,25 +244,14 @@ impl<'a> Differences<'a> {
             }
             let next = slope(&above.gaps, &below.gaps, t + 1);
             let (rows, bounds) = (slope(&above.rows, &below.rows, t), slope(&above.bounds, &below.bounds, t));
-            let is_zero = |column: &DVector<f64>| column.iter().all(|x| *x == 0.0);
             let all = [&gradient, &next, &rows, &bounds];
-            if knot.is_none() && all.into_iter().all(is_zero) {
+            if knot.is_none() && all.into_iter().all(|column| column.iter().all(|x| *x == 0.0)) {
                 continue;
             }
             let active = [rows.len(), bounds.len()];
-            let knot = knot.get_or_insert_with(|| KnotJacobian {
-                gradient: None,
-                next: None,
-                rows: None,
-                bounds: None,
-                active,
-            });
+            let knot = knot.get_or_insert_with(|| KnotJacobian::new(active, j));
             let KnotJacobian { gradient: G, next: N, rows: R, bounds: B, .. } = knot;
-            for (matrix, column) in [G, N, R, B].into_iter().zip(all) {
-                if matrix.is_some() || !is_zero(column) {
-                    matrix.get_or_insert_with(|| zeros(column.len())).column_mut(j).copy_from(column);
-                }
-            }
+            [G, N, R, B].into_iter().zip(all).for_each(|(matrix, column)| matrix.push(column));
         }
     }
 }
@@ -367,7 +279,7 @@ fn write_all(nudge: &Nudge, problem: &mut Problem, differences: &mut Differences
     let base = Conditions::new(point, problem);
     point.check_gradients(&base.gradients)?;
     for j in 0..nudge.size() {
-        let step = nudge.step();
+        let step = nudge.step(j);
         nudge.apply(problem, j, step)?;
         let above = Conditions::new(point, problem);
         match nudge.is_linear() {

@@ -73,6 +73,7 @@ fn recorded(solver: SolverSettings) -> Record {
         make(Call::SetX0 { x0: x0.into() });
         match k {
             1 => make(Call::SetWeight { name: "effort".into(), weight: 2e-3 }),
+            0 => make(Call::SetParameter { name: "gravity".into(), values: vec![0.0, 0.0, -9.8].into() }),
             2 => make(Call::SetWeights { name: "state".into(), weights: vec![2.0; KNOTS + 1].into() }),
             3 => make(Call::SetEntryWeights { name: "state".into(), weights: vec![0.5; 36 * (KNOTS + 1)].into() }),
             4 => {

@@ -334,6 +334,24 @@ impl Problem {
         visit(&mut *self.terminal)
     }
 
+    /// Calls `visit` for each action, the terminal one last, until `visit` returns an error. Copies that other threads
+    /// use are dropped.
+    pub(crate) fn each_own_action<E>(
+        &mut self,
+        visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
+    ) -> Result<(), E> {
+        (0..self.models.actions.len()).for_each(|k| self.copies.forget(k));
+        self.each_action(visit)
+    }
+
+    /// Makes all actions share their scratch memory, and allocates it.
+    pub(crate) fn share_scratch(&mut self) {
+        self.models.share();
+        share(&*self.models.actions[0], &mut *self.terminal);
+        self.models.actions.iter_mut().for_each(|action| reserve(&mut **action));
+        reserve(&mut *self.terminal);
+    }
+
     /// Counts a call that may change the problem.
     pub(crate) fn mark_changed(&mut self) {
         self.revision += 1;

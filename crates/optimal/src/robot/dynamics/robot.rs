@@ -247,6 +247,13 @@ impl RobotDynamics {
         Ok(Self { model, actuation, terms, kind, given, capabilities, groups, shared, work })
     }
 
+    /// Replaces the robot by one that differs only in its numbers. The workspace is allocated again at its next use.
+    pub(crate) fn set_model(&mut self, model: &Arc<Model>) {
+        self.model = model.clone();
+        self.terms.set_model(model);
+        (self.shared, self.work) = (SharedData::default(), OnDemand::default());
+    }
+
     /// Returns the contacts, in the order of their forces in λ.
     pub(crate) fn contacts(&self) -> &[Contact] {
         match &self.kind {

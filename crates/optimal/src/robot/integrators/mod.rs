@@ -436,6 +436,12 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         has_duration
     }
 
+    fn bounds_mut(&mut self) -> Option<([&mut [f64]; 2], usize)> {
+        let count = self.inner.nu();
+        let [lower, upper] = self.bounds.as_mut()?;
+        Some(([lower, upper], count))
+    }
+
     fn advance(&mut self, t: usize, x: &[f64], u: &[f64], dt: f64, next: &mut [f64]) -> bool {
         let has_duration = !matches!(self.method, Method::Terminal | Method::Impact);
         if has_duration {

@@ -421,6 +421,24 @@ impl Residual {
         true
     }
 
+    /// Calls `change` with the friction cone of a contact force or of a wrench, and writes the matrix W of
+    /// [`force_rows`](Self::force_rows) again. Returns whether the residual has a cone. `change` must keep the number
+    /// of sides.
+    pub(crate) fn change_friction(
+        &mut self,
+        rows: usize,
+        W: &mut [f64],
+        change: &mut dyn FnMut(&mut FrictionCone),
+    ) -> bool {
+        match self {
+            Self::FrictionCone { cone, .. } => change(cone),
+            Self::WrenchCone { cone, .. } => change(&mut cone.friction),
+            _ => return false,
+        }
+        W.copy_from_slice(&self.force_rows(rows));
+        true
+    }
+
     /// Returns the matrix W, row after row, of a residual r = W f, where f is a contact's force. W has as many columns
     /// as the contact has rows.
     pub(crate) fn force_rows(&self, rows: usize) -> Vec<f64> {
