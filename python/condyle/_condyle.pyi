@@ -136,6 +136,7 @@ __all__ = [
     "_generate",
     "_lend",
     "_model_from_bytes",
+    "_rnea_pull",
     "_solve_many",
     "_spelled_crba",
     "_spelled_difference",
@@ -5056,6 +5057,18 @@ class Sensitivity:
     def report(self) -> SensitivityReport:
         """The `SensitivityReport` on the solution: active bounds, residuals and strict complementarity."""
 
+    @staticmethod
+    def _at(
+        problem: Problem,
+        xs: ArrayLike,
+        us: _Controls,
+        K: ArrayLike,
+        curvature: Literal["exact", "dynamics", "gauss_newton"],
+    ) -> Sensitivity:
+        """Computes the derivatives at a solution of `Fddp` with the given states, controls and gains, which may come from
+        `solve_many`. The problem must be the solved problem.
+        """
+
     def bounds(self, by_xs: ArrayLike | None = None, by_us: _Controls | None = None) -> BoundGradients:
         """Computes the gradients of a loss with respect to the initial state and to all active bounds, as
         `BoundGradients`. They need no parameter.
@@ -5134,7 +5147,8 @@ class Sensitivity:
 
         parameters: the names of the parameters.
 
-        Raises `ProblemError` if a parameter does not exist, or if the problem has changed since this object was created.
+        Raises `ProblemError` if a parameter does not exist, or if the problem has changed since this object was
+        created.
         """
 
 @final
@@ -5261,8 +5275,9 @@ def _solve_many(
     solver: the settings of all solves.
     count: the number V of variations.
     data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name of a cost, numbers) called
-        "references" and "weights", with the numbers of all knots in a row.
-    start: the states and controls from which all variations start.
+        "references" and "weights", with the numbers of all knots in a row. Also "xs" and "us", with the states and
+        controls from which each variation starts, the numbers of all knots in a row.
+    start: the states and controls from which all variations start, unless `data` has their own.
     vary: None, or a function of the problem and an item that changes the problem or returns another one.
     items: the arguments of `vary`.
     keep: the arrays of each solution to keep.
@@ -5270,6 +5285,15 @@ def _solve_many(
 
     Returns the columns of `Variations`, without `error`; the status of a variation that did not start is empty. Also
     returns the exceptions of the variations that failed, as pairs (index, exception).
+    """
+
+def _rnea_pull(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, lambda_: ArrayLike, count: int
+) -> list[_Array]:
+    """Computes Jᵀ λ of `rnea` for many states, with respect to q, v and a, in parts that stay in the cache.
+
+    q: positions, (N, nq); v, a, lambda_: velocities, accelerations and λ, (N, nv); count: the number of results, 3 or
+    2, without a. Returns arrays (N, nv); the first one belongs to the tangent space.
     """
 
 def joint_torque_regressor(
