@@ -84,6 +84,7 @@ ARGUMENTS = {
         _DifferentialIk._converge.com _DifferentialIk._converge.posture _DifferentialIk._step.com
         _DifferentialIk._step.posture _GlobalIk._solve.targets _GlobalIk._solve.posture
         Model.with_damping.damping Model.with_damping.polynomial Model.with_friction.friction
+        Sensitivity._at.K
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
         lower pi placement point rest stiffness
         q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort

@@ -39,7 +39,8 @@ def rnea(pool: Pool, forces: bool) -> Operation:
         return blocks
 
     def slopes(scratch: Scratch, x: list[_Array], r: _Array) -> list[_Array | None]:
-        return [*c._rnea_pull(model, scratch.data, *x, r, 3)]
+        q, v, a = x
+        return [*c._rnea_pull(model, scratch.data, q, v, a, r, 3)]
 
     inputs, pulled = [*_motion(pool, 3), *_forces(pool, forces)], None if forces else slopes
     return Operation("rnea", pool, inputs, [Slot("tau", (nv,))], value, jacobians, hessian, slopes=pulled)

@@ -1,6 +1,7 @@
 """Parameters of a problem in `ProblemLayer`: how each is set, and the gradient with respect to it."""
 
 import re
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ class Parameter:
     """
 
     def __init__(
-        self, problem: Problem, name: str, by_knot: bool, states: States, own: dict[str, _Array] | None = None
+        self, problem: Problem, name: str, by_knot: bool, states: States, own: Mapping[str, _Array] | None = None
     ) -> None:
         self.name, self.by_knot, self._states = name, by_knot, states
         self._knots = problem.horizon + 1

@@ -285,10 +285,10 @@ class Solves:
             columns, wrong = _solve_many(*given)
         except ProblemError as error:
             raise _NoCopyError from error
-        for k, error in wrong:
-            if not isinstance(error, ProblemError):
-                raise error
-            failures[indices[k]] = str(error)
+        for k, fault in wrong:
+            if not isinstance(fault, ProblemError):
+                raise fault
+            failures[indices[k]] = str(fault)
             self.statuses[indices[k]] = "error"
         excluded, found = {k for k, _ in wrong}, {}
         for k, i in enumerate(indices):

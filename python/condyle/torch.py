@@ -307,7 +307,7 @@ class _Signature(inspect.Signature):
 
 def _fast(kind: Any) -> None:
     """Stores a signature, because PyTorch would compute it for each call, in 60 µs."""
-    kind.forward.__signature__ = _Signature(inspect.signature(kind.forward).parameters.values())
+    kind.forward.__signature__ = _Signature([*inspect.signature(kind.forward).parameters.values()])
 
 
 for _kind in (_Value, _Pull, _Push, _Bend, _Curve):

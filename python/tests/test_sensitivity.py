@@ -248,6 +248,10 @@ def test_errors(arm, loss):
         sensitivity.gradient("entry_weights/effort", *loss)
     with pytest.raises(ValueError, match="by_xs"):
         sensitivity.gradient("x0", np.zeros((3, 14)))
+    by_us = np.zeros((KNOTS, 7))
+    by_us[0, 3] = np.nan
+    with pytest.raises(ProblemError, match=r"`by_us\[3\]` is NaN, which is not finite"):
+        sensitivity.gradient("x0", by_us=by_us)
     with pytest.raises(ValueError, match="by_us"):
         sensitivity.gradient("x0", by_us=np.zeros((KNOTS, 3)))
     with pytest.raises(ValueError, match="curvature: expected 'exact', 'dynamics' or 'gauss_newton', found 'hessian'"):
