@@ -1,7 +1,7 @@
 """Solves many problems of one shape that differ in data: in SIMD lanes, or one by one on each thread."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,6 @@ from ._condyle import Fddp, Problem, _solve_many
 from ._report import counter
 from ._types import Solution
 from ._variations import (
-    Array,
     Job,
     Solver,
     Variations,
@@ -38,7 +37,7 @@ def solve_many(
     start: Solution | Variations | tuple[Any, Any] | None = None,
     solver: Solver = Fddp,
     settings: dict[str, Any] | None = None,
-    keep: Sequence[Array] = ("xs", "us"),
+    keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
     threads: int = 1,
     progress: bool | Callable[[int, Any], object] = False,
 ) -> Variations:
