@@ -1,7 +1,7 @@
 """Solves many problems of one shape that differ in data: in SIMD lanes, or one by one on each thread."""
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from ._arguments import described, named, reals
 from ._condyle import Fddp, Problem, _solve_many
 from ._report import counter
+from ._sweep import sweep
 from ._types import Solution
 from ._variations import (
-    Array,
     Job,
     Solver,
     Variations,
@@ -30,7 +30,7 @@ _Array = NDArray[np.float64]
 
 def solve_many(
     problem: Problem,
-    x0: ArrayLike | None = None,
+    x0: ArrayLike | Iterator[Any] | None = None,
     *,
     references: dict[str, ArrayLike] | None = None,
     weights: dict[str, ArrayLike] | None = None,
@@ -38,7 +38,7 @@ def solve_many(
     start: Solution | Variations | tuple[Any, Any] | None = None,
     solver: Solver = Fddp,
     settings: dict[str, Any] | None = None,
-    keep: Sequence[Array] = ("xs", "us"),
+    keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
     threads: int = 1,
     progress: bool | Callable[[int, Any], object] = False,
 ) -> Variations:
@@ -52,7 +52,9 @@ def solve_many(
     other, with the result of a single solve, to the bit; lanes compute several knots of one problem.
 
     problem: the nominal problem. It is copied, and not changed.
-    x0: the initial states, (V, nx); or one initial state for all problems, nx numbers; None takes the problem's.
+    x0: the initial states, (V, nx); or one initial state for all problems, nx numbers; None takes the problem's. Or an
+        iterator over states or dicts of data, as `variations` in `sweep`, which is read chunk by chunk. References,
+        weights, contacts, starts of each problem, and a time budget are then not possible.
     references: for names of costs, the targets of each problem, (V, N + 1, n), with rows as in
         `Problem.set_references`; or (V, n), one target for all knots of a problem.
     weights: for names of costs, the weights of each problem, (V, N + 1), or (V,), one weight for all knots.
@@ -68,7 +70,7 @@ def solve_many(
     threads: the number of threads, each of which solves its own problems.
     progress: as in `sweep`.
 
-    Returns `Variations`. The error of a problem is stored in its row, and does not affect the others. For more problems
+    Returns `Variations`. The error of a problem is stored in its row, and does not affect the others. For more results
     than fit into memory, use `condyle.sweep_chunks`; for variations that change the model, use `condyle.sweep`.
 
     Raises TypeError or ValueError for invalid arguments, KeyError for a cost or contact that no knot has, and
@@ -84,6 +86,17 @@ def solve_many(
     ({'converged'}, (100, 20, 7), (100, 20, 7, 14))
     """
     options, arrays, threads = checked(problem, solver, settings, keep, threads, progress)
+    if isinstance(x0, Iterator):
+        others = {"references": references, "weights": weights, "contacts": contacts}
+        others["settings['time_budget']"] = options.get("time_budget")
+        given = [name for name, value in others.items() if value is not None]
+        if isinstance(start, Variations):
+            raise ValueError("start: expected one start for all problems of an iterator x0, found Variations")
+        if given:
+            raise ValueError(f"{given[0]}: expected None with an iterator x0, whose items may be dicts of data")
+        return sweep(
+            problem, x0, start=start, solver=solver, settings=options, keep=keep, threads=threads, progress=progress
+        )
     data, counts = _data(problem, x0, references, weights, contacts)
     each, starts = _starts(problem, start)
     if each is not None:
@@ -157,8 +170,6 @@ def _data(
         for name, values in data[argument]
     }
     if x0 is not None:
-        if isinstance(x0, Iterator):
-            raise TypeError(f"x0: expected an array of states, found {described(x0)}: see condyle.sweep_chunks")
         data["x0"] = reals("x0", x0, f"states, (V, {problem.nx}) or {problem.nx} numbers")
         if data["x0"].shape != (problem.nx,):
             counts["x0"] = len(states_of(problem, x0, "x0"))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,6 @@ from ._report import counter
 from ._types import Solution
 from ._variations import (
     EXPECTED,
-    Array,
     Job,
     Rows,
     Solver,
@@ -46,7 +45,7 @@ def sweep(
     start: Solution | tuple[Any, Any] | None = None,
     solver: Solver = Fddp,
     settings: dict[str, Any] | None = None,
-    keep: Sequence[Array] = ("xs", "us"),
+    keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
     folder: "str | PathLike[str] | None" = None,
     chunk: int = 64,
     cluster: bool | str | None = None,
@@ -130,7 +129,7 @@ def sweep_chunks(
     start: Solution | tuple[Any, Any] | None = None,
     solver: Solver = Fddp,
     settings: dict[str, Any] | None = None,
-    keep: Sequence[Array] = ("xs", "us"),
+    keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
     folder: "str | PathLike[str] | None" = None,
     chunk: int = 64,
     cluster: bool | str | None = None,

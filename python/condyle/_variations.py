@@ -1,7 +1,7 @@
 """Results of many solves, and the data that the solves share."""
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ _Array = NDArray[np.float64]
 Rows = dict[str, NDArray[Any]]
 """Columns of results, with the names of `Variations`."""
 Solver = type[Fddp] | type[AugmentedLagrangian] | type[InteriorPoint]
-Array = Literal["xs", "us", "K", "k"]
 
 EXPECTED = (Error, ArithmeticError, LookupError, TypeError, ValueError)
 """Exceptions that are the fault of one variation, and do not end a call."""

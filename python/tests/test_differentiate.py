@@ -113,7 +113,7 @@ CASES: dict[str, Case] = {
     "transport": lambda r, q, v: condyle.transport(r.model, v, np.outer(v, [1.0, 2.0])),
 }
 NOT_OF_A_STATE = {"gradient", "hessian", "jacobian", "load", "neutral", "random_configuration", "sweep"}
-NOT_OF_A_STATE |= {"exp3", "exp6", "log3", "log6"}
+NOT_OF_A_STATE |= {"exp3", "exp6", "log3", "log6", "sweep_chunks"}
 
 
 def held(r: Robot) -> condyle.ConstraintSet:

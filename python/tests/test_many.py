@@ -237,9 +237,14 @@ def test_progress_and_its_exceptions(solver: Any) -> None:
         (ValueError, "x0: expected the states of several problems", {}),
         (TypeError, r"x0: expected states, .*, found 'rest'", {"x0": "rest"}),
         (
-            TypeError,
-            "x0: expected an array of states, found a generator: see condyle.sweep_chunks",
-            {"x0": (REST for _ in range(3))},
+            ValueError,
+            "references: expected None with an iterator x0, whose items may be dicts of data",
+            {"x0": iter([REST]), "references": {"reach": np.zeros((1, 3))}},
+        ),
+        (
+            ValueError,
+            r"settings\['time_budget'\]: expected None with an iterator x0",
+            {"x0": iter([REST]), "settings": {"time_budget": 1.0}},
         ),
         (ValueError, "x0: expected states, .*, found rows of different shapes", {"x0": [REST, REST[:3]]}),
         (TypeError, "x0: expected real numbers, found complex ones", {"x0": np.ones((2, 14)) * 1j}),
@@ -333,6 +338,15 @@ def test_wrong_problems_and_settings_are_named() -> None:
     no_states = solve_many(reach(), np.tile(REST, (2, 1)), start=held(), keep=["us"])
     with pytest.raises(ValueError, match="start: expected Variations with xs and us"):
         solve_many(reach(), start=no_states)
+
+
+def test_problems_of_an_iterator() -> None:
+    x0s = np.random.default_rng(4).normal(REST, 0.1, (70, 14))
+    found = solve_many(reach(), x0s, start=held())
+    for items in (iter(x0s), ({"x0": x0, "weights": {"rest": 0.1}} for x0 in x0s)):
+        again = solve_many(reach(), items, start=held(), threads=2)
+        assert np.array_equal(again.xs, found.xs)
+        assert again.error.tolist() == [""] * 70
 
 
 def test_no_problems() -> None:
