@@ -5269,6 +5269,7 @@ def _solve_many(
     keep: list[str],
     threads: int,
     report: Callable[[int], object] | None,
+    whole: bool = False,
 ) -> tuple[dict[str, Any], list[tuple[int, BaseException]]]:
     """Solves variations of a problem: see `condyle.optimal.solve_many` and `condyle.sweep`.
 
@@ -5282,6 +5283,7 @@ def _solve_many(
     items: the arguments of `vary`.
     keep: the arrays of each solution to keep.
     report: None, or a function that is called with the number of variations that have ended.
+    whole: whether the time budget of the solver applies to the whole call. If not, it applies to each solve.
 
     Returns the columns of `Variations`, without `error`; the status of a variation that did not start is empty. Also
     returns the exceptions of the variations that failed, as pairs (index, exception).

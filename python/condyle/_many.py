@@ -129,8 +129,8 @@ def solve_many(
             None,
             list(arrays),
             threads,
-            True,
             tell if progress else None,
+            True,
         )
         if progress:
             tell(count)

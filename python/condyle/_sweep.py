@@ -321,7 +321,7 @@ class Worker:
     def _call(self, count: int, data: dict[str, Any], vary: Any) -> tuple[Rows, list[tuple[int, BaseException]]]:
         job = self._job
         solver = self._same or job.solver(job.problem, **job.settings)
-        found, wrong = _solve_many(solver, count, data, job.start, vary, list(job.keep), job.threads, False, None)
+        found, wrong = _solve_many(solver, count, data, job.start, vary, list(job.keep), job.threads, None)
         return columns(job, found), wrong
 
     def _data(self, item: Any) -> dict[tuple[str, str], Any]:

@@ -36,12 +36,13 @@ const PLACEMENT: usize = 16;
 /// vary: None, or a function of the problem and an item that changes the problem or returns another one.
 /// items: the arguments of `vary`.
 /// keep: the arrays of each solution to keep.
-/// whole: whether the time budget of the solver applies to the whole call. If not, it applies to each solve.
 /// report: None, or a function that is called with the number of variations that have ended.
+/// whole: whether the time budget of the solver applies to the whole call. If not, it applies to each solve.
 ///
 /// Returns the columns of `Variations`, without `error`; the status of a variation that did not start is empty. Also
 /// returns the exceptions of the variations that failed, as pairs (index, exception).
 #[pyfunction(name = "_solve_many")]
+#[pyo3(signature = (solver, count, data, start, vary, keep, threads, report, whole=false))]
 pub(crate) fn solve_variations<'py>(
     py: Python<'py>,
     solver: &Bound<'py, PyAny>,
@@ -51,8 +52,8 @@ pub(crate) fn solve_variations<'py>(
     vary: Option<(Py<PyAny>, Py<PyList>)>,
     keep: Vec<String>,
     threads: usize,
-    whole: bool,
     report: Option<Py<PyAny>>,
+    whole: bool,
 ) -> PyResult<(Bound<'py, PyDict>, Errors)> {
     let shell = Shell::of(solver)?;
     let problem = shell.problem.get();
