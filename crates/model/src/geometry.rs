@@ -100,6 +100,9 @@ fn is_identity(pose: &Se3<f64>) -> bool {
     *pose == Se3::identity()
 }
 
+/// Index of a body, and the pose of a shape in the body's frame.
+type BodyPose = (usize, Se3<f64>);
+
 /// Maximum deviation of the square of a normal's length from 1; chosen for numbers with seven digits in files.
 const UNIT: f64 = 1e-6;
 
@@ -361,7 +364,7 @@ impl GeometryPair {
     /// # Errors
     /// Returns the errors of [`resolve`](Self::resolve). Returns [`Error::Geometry`] too if two different geometries
     /// have one name, or if a pair is in the list twice, in either order.
-    pub fn resolve_all(model: &Model, pairs: &[Self]) -> Result<Vec<[(usize, Se3<f64>); 2]>, Error> {
+    pub fn resolve_all(model: &Model, pairs: &[Self]) -> Result<Vec<[BodyPose; 2]>, Error> {
         // the different geometries, with the pair and the side that have them first
         let mut all: Vec<(&Geometry, usize, usize)> = Vec::new();
         let mut seen = BTreeMap::new();

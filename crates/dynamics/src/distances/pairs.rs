@@ -151,7 +151,7 @@ impl DistancePairs {
             let method = Method::of(&all.geometries[a].solid, &all.geometries[b].solid);
             match method {
                 Method::Spheres => all.spheres.push(item(pair, a, b)),
-                Method::Capsules => all.capsules.push(item(pair, a, b)),
+                Method::Capsules | Method::CapsuleAndSphere => all.capsules.push(item(pair, a, b)),
                 Method::Plane | Method::Other => {
                     all.others.push(pair);
                     all.geometries[a].is_general = true;
@@ -466,7 +466,7 @@ impl DistancePairs {
                         items[front] = item(k, a, b);
                         front += 1;
                     }
-                    (None, Method::Capsules) => {
+                    (None, Method::Capsules | Method::CapsuleAndSphere) => {
                         back -= 1;
                         items[back] = item(k, a, b);
                     }

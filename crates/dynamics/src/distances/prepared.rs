@@ -7,7 +7,7 @@
 //! Distances above a range r are replaced by r, with the gradient 0. A result is therefore min(d, r).
 
 use super::pairs::{DistancePairs, PathColumn, add_path};
-use super::round::{Round, Witness, capsules, spheres};
+use super::round::{Round, Witness, capsule_and_sphere, capsules, spheres};
 use super::solid::{Solid, distance, is_exact};
 use crate::passes::frames::Placements;
 use alloc::vec::Vec;
@@ -22,6 +22,8 @@ pub enum Method {
     Spheres,
     /// Both shapes are spheres or capsules.
     Capsules,
+    /// Capsule, followed by a sphere: a special case of capsules that takes a third of the time.
+    CapsuleAndSphere,
     /// Sphere or capsule above a half-space.
     Plane,
     /// Another pair, which is computed for one state after another.
@@ -33,7 +35,8 @@ impl Method {
     pub(crate) fn of(first: &Solid, second: &Solid) -> Self {
         match (first, second) {
             (Solid::Sphere(_), Solid::Sphere(_)) => Self::Spheres,
-            (Solid::Sphere(_) | Solid::Capsule(_), Solid::Sphere(_) | Solid::Capsule(_)) => Self::Capsules,
+            (Solid::Capsule(_), Solid::Sphere(_)) => Self::CapsuleAndSphere,
+            (Solid::Sphere(_) | Solid::Capsule(_), Solid::Capsule(_)) => Self::Capsules,
             (Solid::Sphere(_) | Solid::Capsule(_), Solid::HalfSpace { .. }) => Self::Plane,
             _ => Self::Other,
         }
@@ -105,14 +108,14 @@ impl PreparedPairs {
         Ok(all)
     }
 
-    /// Moves a half-space behind a sphere or capsule. Returns the method of the pair. Neither a distance nor its
-    /// gradient depends on the order of the shapes.
+    /// Moves a half-space after a sphere or capsule, and a sphere after a capsule. Returns the method of the pair.
+    /// Neither a distance nor its gradient depends on the order of the shapes.
     fn order(&self, shapes: &mut [usize; 2]) -> Method {
         let [a, b] = shapes.map(|k| &self.shapes[k].solid);
         match (Method::of(a, b), Method::of(b, a)) {
-            (Method::Other, Method::Plane) => {
+            (Method::Other, method @ Method::Plane) | (Method::Capsules, method @ Method::CapsuleAndSphere) => {
                 shapes.reverse();
-                Method::Plane
+                method
             }
             (method, _) => method,
         }
@@ -360,6 +363,7 @@ kernel! {
             let Witness { distance, points: [p, _], normal: n } = match method {
                 Method::Spheres => spheres(&round(first), &round(second)),
                 Method::Capsules => capsules(&round(first), &round(second)),
+                Method::CapsuleAndSphere => capsule_and_sphere(&round(first), &round(second)),
                 Method::Plane => above(&round(first), second),
                 Method::Other => continue,
             };

@@ -145,6 +145,30 @@ impl<S: Scalar> Nearest<S> {
     }
 }
 
+/// Returns the distance of a capsule and a sphere. The nearest point of the segment to the sphere's centre has the
+/// parameter s = −h·w / |h|², limited to [−1, 1].
+#[inline(always)]
+pub(crate) fn capsule_and_sphere<S: Scalar>(capsule: &Round<S>, sphere: &Round<S>) -> Witness<S> {
+    let (h, w) = (capsule.half, capsule.center - sphere.center);
+    let a = h.norm_squared();
+    let s = clamp(-h.dot(w) * inverse(a));
+    let d = w + h.scale(s);
+    let least = d.norm_squared();
+    let touch = least.lt((a + w.norm_squared()) * S::splat(TOUCHING) + S::splat(COINCIDENT));
+    let points = [capsule.center + h.scale(s), sphere.center];
+    witness(points, d, least, touch, perpendicular(h)).enlarged(capsule.radius, sphere.radius)
+}
+
+/// Returns the result for the nearest points of two segments, with their difference d and its square. Segments that
+/// touch have the normal `across`, up to its sign and length.
+#[inline(always)]
+fn witness<S: Scalar>(points: [Vec3<S>; 2], d: Vec3<S>, least: S, touch: S::Mask, across: Vec3<S>) -> Witness<S> {
+    let across = choose::<S>(across.dot(d).lt(S::zero()), -across, across);
+    let length = S::select(touch, across.norm_squared(), least).sqrt();
+    let normal = choose::<S>(touch, across, d).scale(length.recip());
+    Witness { distance: S::select(touch, S::zero(), length), points, normal }
+}
+
 /// Returns the distance of two capsules.
 ///
 /// The distance is exact, also if the capsules overlap: the difference of two segments is a parallelogram, which has no
@@ -177,12 +201,8 @@ pub(crate) fn capsules<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witnes
     let size = a + e + w.norm_squared();
     let touch = least.lt(size * S::splat(TOUCHING) + S::splat(COINCIDENT));
     let across = choose::<S>(parallel, perpendicular(choose::<S>(a.lt(e), h2, h1)), n);
-    let across = choose::<S>(across.dot(d).lt(S::zero()), -across, across);
-    let length = S::select(touch, across.norm_squared(), least).sqrt();
-    let normal = choose::<S>(touch, across, d).scale(length.recip());
-    let distance = S::select(touch, S::zero(), length);
     let points = [first.center + h1.scale(s), second.center + h2.scale(t)];
-    Witness { distance, points, normal }.enlarged(first.radius, second.radius)
+    witness(points, d, least, touch, across).enlarged(first.radius, second.radius)
 }
 
 /// Returns the square root of a number. It is a method of [`Scalar`], because `core` has no square root.

@@ -127,6 +127,12 @@ impl Columns {
 
     /// Appends a run of [C D] to `rows`.
     fn push_run(self, first: usize, entries: &[f64], rows: &mut ScaledRows) {
+        let Self { n, turn, .. } = self;
+        let end = first + entries.len();
+        if end <= turn || (turn <= first && end <= n) || n <= first {
+            let to = self.place(first);
+            return rows.push(to..to + entries.len())[to..][..entries.len()].copy_from_slice(entries);
+        }
         let [mut start, mut end] = [usize::MAX, 0];
         self.each_run(first, entries, |to, run| (start, end) = (start.min(to), end.max(to + run.len())));
         let row = rows.push(start..end);

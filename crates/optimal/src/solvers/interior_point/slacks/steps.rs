@@ -98,6 +98,10 @@ impl Slacks {
                         du[first - n - m]
                     };
             }
+            let (first, entries) = run;
+            if first + entries.len() <= n {
+                return short_dot(entries, &dx[first..]); // such as a distance
+            }
             let parts = [dx, w, du].into_iter().zip(split(run, [n, m]));
             parts.map(|(d, (first, entries))| short_dot(entries, &d[first..])).sum()
         };
@@ -198,6 +202,11 @@ impl Vectorized for AddGradient<'_> {
         let Self { slacks, first, knot, to: [of_x, of_w, of_u] } = self;
         let sizes = [knot.ndx(), knot.nu()];
         let mut add = |y: f64, run: (usize, &[f64])| {
+            let (first, entries) = run;
+            if first + entries.len() <= sizes[0] {
+                let to = &mut of_x[first..][..entries.len()]; // such as a distance
+                return to.iter_mut().zip(entries).for_each(|(to, entry)| *to += y * entry);
+            }
             let parts = [&mut *of_x, &mut *of_w, &mut *of_u].into_iter().zip(split(run, sizes));
             for (to, (first, entries)) in parts {
                 to[first..].iter_mut().zip(entries).for_each(|(to, entry)| *to += y * entry);
