@@ -7,6 +7,7 @@ mod directions;
 mod fddp;
 mod interior_point;
 mod iterate;
+mod lagrangian;
 mod limit_rows;
 mod many;
 mod multipliers;
