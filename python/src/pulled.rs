@@ -71,7 +71,6 @@ pub(crate) fn rnea_pull<'py>(
 }
 
 /// Computes Jᵀ λ of each state, with n × n matrices J, row by row. At least `TILE` numbers follow the last matrix.
-#[expect(clippy::needless_range_loop)] // adapters of iterators are not inlined here, which takes eight times as long
 fn multiply(to: &mut [f64], jacobians: &[f64], lambda: &[f64], n: usize) {
     if n == 0 {
         return;
@@ -84,6 +83,7 @@ fn multiply(to: &mut [f64], jacobians: &[f64], lambda: &[f64], n: usize) {
                 let row: &[f64; TILE] =
                     J[row * n + tile * TILE..].first_chunk().expect("padding after the last matrix");
                 for k in 0..TILE {
+                    // adapters of iterators are not inlined here, which takes eight times as long
                     sums[k] += factor * row[k];
                 }
             }
