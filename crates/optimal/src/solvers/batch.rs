@@ -54,14 +54,15 @@ pub trait ManyProblems: Sync {
 ///
 /// As many problems as a SIMD register has lanes are solved together. Each problem has its own iterations of [`Fddp`]:
 /// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. The
-/// sweeps run in lanes too, if the robot is an arm of at most 16 joints, each with a motor, without bounds on controls
-/// and in [inverse-dynamics form](Settings::inverse_dynamics_form). Other problems are swept one by one. A problem that
-/// has ended is replaced by the next one. Each thread solves its own problems.
+/// sweeps run in lanes too, if the processor has AVX-512 and the robot is an arm of at most 16 joints, each with a
+/// motor. Controls must have no bounds, and knots the [inverse-dynamics form](Settings::inverse_dynamics_form). Other
+/// problems are swept one by one. A problem that has ended is replaced by the next one. Each thread solves its own
+/// problems.
 ///
 /// The result of a problem does not depend on the other problems, to the bit. It differs from the result of [`Fddp`] by
-/// rounding at most, because [`Fddp`] rolls out a single trial by another algorithm. If a problem has other dynamics or
-/// other kinds of costs than the nominal problem, it is solved alone, by [`Fddp`]. The same holds for different contact
-/// placements.
+/// rounding at most, because [`Fddp`] rolls out a single trial, and sweeps, by other algorithms. If a problem has other
+/// dynamics or other kinds of costs than the nominal problem, it is solved alone, by [`Fddp`]. The same holds for
+/// different contact placements.
 ///
 /// ```
 /// use condyle_optimal::{BatchFddp, Error, LqKnot, Lqr, ManyProblems, Problem, Solution};
