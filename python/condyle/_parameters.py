@@ -1,6 +1,5 @@
 """Parameters of a problem in `ProblemLayer`: how each is set, and the gradient with respect to it."""
 
-import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -93,10 +92,14 @@ def _rotated(R: _Array, g: _Array) -> _Array:
     return product
 
 
+NUMBERS = ("bounds", "friction", "inertia", "gravity", "armature")
+"""Kinds of parameters that are numbers of all knots or of the robot, set by `Problem.set_parameter`."""
+
+
 class Parameter:
     """One parameter of a problem: how it is set, and the gradient with respect to it.
 
-    name: "x0", "target/NAME", "weight/NAME", "entry_weights/NAME", "contact/NAME", "duration" or a name in `own`;
+    name: a name in `Problem.parameters()` or in `own`;
     by_knot: whether each knot has its own value; own: the nominal values of parameters of one's own.
     """
 
@@ -127,11 +130,13 @@ class Parameter:
         elif kind == "contact" and self._of and not by_knot:
             problem.set_contact(self._of)  # an error if the contact does not exist
             shape = (4, 4)
+        elif kind in NUMBERS and not by_knot and name in (sizes := problem.parameters()):
+            shape = () if kind == "friction" else (sizes[name],)
         else:
             raise ValueError(
-                "parameters: expected 'x0' or 'contact/NAME' (not by knot), 'target/NAME', 'weight/NAME' or "
-                "'entry_weights/NAME' of the cost NAME, 'duration', or a name in own, found "
-                f"{name!r}{' by knot' if by_knot else ''}"
+                "parameters: expected a name in problem.parameters() or in own, which may differ by knot only for "
+                f"'target/NAME', 'weight/NAME', 'entry_weights/NAME' and 'duration', found {name!r}"
+                f"{' by knot' if by_knot else ''}"
             )
         self.shape: _Shape = (self._knots, *shape) if by_knot else shape
         """The shape of one value."""
@@ -144,6 +149,8 @@ class Parameter:
             problem.set_weight(self._of, value if self.by_knot else float(value))
         elif self._kind == "contact":
             problem.set_contact(self._of, placement=value)
+        elif self._kind in NUMBERS:
+            problem.set_parameter(self.name, np.atleast_1d(value))
         elif self._kind == "duration":
             for t in self._timed:
                 problem.set_duration(t, float(value[t] if self.by_knot else value))
@@ -156,7 +163,7 @@ class Parameter:
 
     def slope(self, g: _Array, value: _Array) -> _Array:
         """Returns the gradient of the loss with the shape of the value, for its gradient g in the tangent space."""
-        if self.own or self._kind in ("weight", "duration"):
+        if self.own or self._kind in ("weight", "duration", *NUMBERS):
             return np.asarray(g).reshape(value.shape)
         matrix = value.shape[-2:] if value.ndim - self.by_knot == 2 else ()
         if matrix == (3, 3):
@@ -189,18 +196,12 @@ def _timed(problem: Problem) -> list[int]:
 
 
 def _entries(problem: Problem, cost: str) -> int:
-    """Returns the number of entry weights of a cost, from the message of a wrong number. Raises KeyError if the cost
-    does not exist, and ValueError if its activation has no weights.
+    """Returns the number of entry weights of a cost. Raises KeyError if the cost does not exist, and ValueError if its
+    activation has no weights.
     """
-    n, rows = 1, problem.horizon + 1
-    try:
-        try:
-            problem.set_entry_weights(cost, np.ones((rows, n)))
-        except ProblemError as error:
-            if (expected := re.search(r"has 1 numbers, expected (\d+)", str(error))) is None:
-                raise
-            n = int(expected[1])
-            problem.set_entry_weights(cost, np.ones((rows, n)))
-    except ProblemError as error:
-        raise ValueError(f"parameters: 'entry_weights/{cost}' needs a cost with weights of entries: {error}") from None
-    return n
+    sizes = problem.parameters()
+    if (size := sizes.get(f"entry_weights/{cost}")) is None:
+        if f"weight/{cost}" not in sizes:
+            problem.set_weight(cost, 1.0)  # KeyError: the cost does not exist
+        raise ValueError(f"parameters: 'entry_weights/{cost}' needs a cost with weights of entries")
+    return size

@@ -25,12 +25,13 @@ const FULL: f64 = 0.75;
 ///
 /// As many problems as a SIMD register has lanes are solved together. Each problem has its own iterations of [`Fddp`]:
 /// its own step lengths, regularisation and convergence. The trials of all line searches are rolled out in lanes. The
-/// sweeps run in lanes too, if the robot is an arm of at most 16 joints, each with a motor, without bounds on controls
-/// and in [inverse-dynamics form](Settings::inverse_dynamics_form). Other problems are swept one by one. A problem that
-/// has ended is replaced by the next one. Each thread solves its own problems.
+/// sweeps run in lanes too, if the processor has AVX-512 and the robot is an arm of at most 16 joints, each with a
+/// motor. Controls must have no bounds, and knots the [inverse-dynamics form](Settings::inverse_dynamics_form). Other
+/// problems are swept one by one. A problem that has ended is replaced by the next one. Each thread solves its own
+/// problems.
 ///
 /// The result of a problem does not depend on the other problems, to the bit. It differs from the result of [`Fddp`] by
-/// rounding at most, because [`Fddp`] rolls out a single trial by another algorithm.
+/// rounding at most, because [`Fddp`] rolls out a single trial, and sweeps, by other algorithms.
 ///
 /// A problem with another robot model, such as other inertial parameters, is solved alone, by [`Fddp`]. The same holds
 /// for other frames, kinds or gains of contacts, and for other kinds of costs and limits.
