@@ -338,8 +338,8 @@ class ProblemLayer(_layer.ProblemLayer):
         the parameters in `own`, given by name as arrays of floats.
     parameters: names of the parameters, in the order of a call's arguments. "x0" is the initial state, (nx); also
         "target/NAME", in the shape of the cost's target, "weight/NAME" without axes, and "entry_weights/NAME", (n);
-        "duration", the duration of all knots without axes (s), "contact/NAME", the placement of a contact, (4, 4), and
-        names in `own`.
+        "duration", the duration of all knots without axes (s), "contact/NAME", the placement of a contact, (4, 4),
+        "friction/NAME" without axes, and names in `own`. Any other name of `Problem.parameters` is one axis of numbers.
     own: nominal values of parameters of one's own, by name. Derivatives with respect to them are central differences.
     by_knot: the names of parameters with a value for each knot, whose shapes begin with N + 1.
     robot: the robot, if its positions contain quaternions or pairs (cos, sin). Gradients are then as in `Dynamics`.

@@ -9,7 +9,6 @@ use super::solver_loop::{Pass, SolverLoop};
 use super::start::quasi_static_start;
 use super::watch::{Observer, Recent, Watch};
 use crate::error::Error;
-use crate::lq::LqKnot;
 use crate::problem::Problem;
 use crate::time::Instant;
 use nalgebra::DVector;
