@@ -6,7 +6,7 @@ use super::knot::LqKnot;
 use super::lane_step::{SUMS, StepSize, begin_sweep, end_sweep, step};
 use condyle_dynamics::level::{Level, level};
 use condyle_spatial::block::{Block, Real, SimdToken, gather_rows, scatter_rows};
-use core::fmt::Debug;
+use core::fmt::{self, Debug};
 
 /// Token that allows this module to name SIMD vector types.
 struct Gate;
@@ -61,7 +61,6 @@ pub(crate) fn lane_sweep(knots: &[LqKnot]) -> Option<Box<dyn LaneSweep>> {
 }
 
 /// Sweep in the lanes of the scalar `S`, with its workspace.
-#[derive(Debug)]
 struct Lanes<S> {
     /// Sizes of a step with as many rows of G as possible.
     size: StepSize,
@@ -79,6 +78,13 @@ struct Lanes<S> {
     unfit: [bool; MOST_LANES],
     /// Zeros, in place of rows of G that a problem does not have.
     zeros: Vec<f64>,
+}
+
+/// Formats the sizes, without the workspace.
+impl<S> Debug for Lanes<S> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Lanes").field("size", &self.size).finish_non_exhaustive()
+    }
 }
 
 impl<S: Block<Number = f64>> Lanes<S> {
