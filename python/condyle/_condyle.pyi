@@ -4471,6 +4471,33 @@ class Problem:
         is beyond the limits of `Problem`.
         """
 
+    def parameter(self, parameter: str) -> _Array:
+        """Returns the value of a parameter, a vector. A matrix is stored row by row: 9 numbers for a rotation, and 16 for
+        a placement.
+
+        parameter: the name of the parameter, see `parameters`.
+
+        Raises `ProblemError` if the parameter does not exist, or if its value differs from knot to knot.
+        """
+
+    def parameter_values(self, parameters: Sequence[str] | None = None) -> dict[str, _Array]:
+        """Returns the values of parameters: a dict of vectors by name, which `set_parameters` sets.
+
+        parameters: the names; None for all parameters whose value is the same at all knots.
+
+        Raises `ProblemError` as `parameter` does, if names are given.
+        """
+
+    def parameters(self) -> dict[str, int]:
+        """Returns the names of all parameters, with the numbers of entries of their values: a dict.
+
+        "x0" is the initial state and "duration" the duration of all knots. A cost NAME has the parameters
+        "target/NAME", "weight/NAME" and "entry_weights/NAME". "contact/NAME" is the placement of a contact.
+        "bounds/lower" and "bounds/upper" are the bounds on controls. "friction/NAME" is the coefficient of friction of
+        the cones that are a limit or a cost NAME. The robot has the parameters "inertia/LINK", the ten
+        `inertial_parameters` of a link, "gravity" and "armature".
+        """
+
     def quasi_static(self, xs: ArrayLike) -> _Array | list[_Array]:
         """Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
         (N, nu), or a list of N arrays if knots differ in nu. The controls of robots are computed by statics, the
@@ -4569,6 +4596,26 @@ class Problem:
 
         Raises `ProblemError` for an unknown model, for a duration that is not above 0 or not 0 at an impact, and for a
         new duration of an action that does not belong to a robot. Then nothing changes.
+        """
+
+    def set_parameter(self, parameter: str, values: ArrayLike) -> None:
+        """Sets a parameter at all knots that have it, without building the problem again. Solvers continue with it.
+
+        parameter: the name of the parameter, see `parameters`.
+        values: the vector, as `parameter` returns it.
+
+        Numbers of a robot are checked as `ModelBuilder.build` checks them. They replace the robot of this problem
+        alone, and take longer to set than other parameters, because workspaces are allocated again.
+
+        Raises `ProblemError` if the parameter does not exist, or for a wrong size or invalid numbers.
+        """
+
+    def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:
+        """Sets several parameters, as `set_parameter` does, in the order of the dict.
+
+        values: a dict of vectors by name.
+
+        Raises `ProblemError` as `set_parameter` does. Parameters before the one in the message have their new values.
         """
 
     def set_placements(self, name: str, placements: ArrayLike) -> None:
@@ -4945,9 +4992,9 @@ class Schedule:
 class Sensitivities:
     """The derivatives of many solutions. Their adjoints are computed several at a time in the lanes of SIMD registers.
 
-    The B problems have the same numbers of knots, states and controls. The results equal those of each `Sensitivity` up
-    to rounding. Different controls may be at their bounds. The adjoint of a solution with active limits is computed
-    alone.
+    The B problems have the same numbers of knots, states and controls. The results equal the results of each
+    `Sensitivity` up to rounding. Different controls may be at their bounds. The adjoint of a solution with active
+    limits is computed alone.
 
     The derivatives with respect to parameters belong to the solved problems, one `Sensitivity` each. If the solutions
     are of one `Problem` whose parameters were set in between, call `Sensitivity.prepare` for the parameters before the
@@ -4959,7 +5006,8 @@ class Sensitivities:
 
     >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivities, Sensitivity
     >>> arm = condyle.robots.arm7()
-    >>> rest, effort = Cost("rest", 1.0, Residual.state(np.zeros(14))), Cost("effort", 0.1, Residual.control(np.zeros(7)))
+    >>> rest = Cost("rest", 1.0, Residual.state(np.zeros(14)))
+    >>> effort = Cost("effort", 0.1, Residual.control(np.zeros(7)))
     >>> knot, end = FreeDynamics(arm, 0.05, [rest, effort]), FreeDynamics(arm, None, [rest])
     >>> problem, each = Problem(np.zeros(14), [knot], [0] * 10, end), []
     >>> solver = Fddp(problem)
@@ -5008,11 +5056,10 @@ class Sensitivity:
     The optimality conditions are linearised at the solution and factorised once. After that, the gradient of a loss
     with respect to a parameter is one pass over the knots, whatever the number of the parameter's entries.
 
-    A parameter has a name. "x0" is the initial state, and "duration" is the duration of all knots. A cost NAME has the
-    parameters "target/NAME", "weight/NAME" and "entry_weights/NAME", the weights of the entries of its residual.
-    "contact/NAME" is the placement of a contact. A parameter that several knots share changes at all of them. Changes
-    are in the tangent space: 2 nv numbers for a state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear
-    first. `define` adds parameters of your own.
+    A parameter has a name, such as "x0", "target/NAME" or "inertia/LINK"; `Problem.parameters` returns all names. A
+    parameter that several knots share changes at all of them. Changes are in the tangent space: 2 nv numbers for a
+    state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear first. Other parameters change by numbers that
+    are added to their values. `define` adds parameters of your own.
 
     Bounds that are active are held active. If `report.strict_complementarity` is False, a bound is active with a
     multiplier near zero; the solution has a kink there, and the derivative on the other side differs.
@@ -5261,10 +5308,10 @@ def rollout_many(
     """
 
 def _solve_many(
-    solver: Fddp,
+    solver: AugmentedLagrangian | Fddp | InteriorPoint,
     count: int,
     data: dict[str, Any],
-    start: tuple[Any, Any],
+    start: tuple[Any, Any] | None,
     vary: tuple[Callable[..., object], list[Any]] | None,
     keep: list[str],
     threads: int,
@@ -5273,12 +5320,12 @@ def _solve_many(
 ) -> tuple[dict[str, Any], list[tuple[int, BaseException]]]:
     """Solves variations of a problem: see `condyle.optimal.solve_many` and `condyle.sweep`.
 
-    solver: the settings of all solves.
+    solver: an `Fddp`, `InteriorPoint` or `AugmentedLagrangian` of the nominal problem, with the settings of all solves.
     count: the number V of variations.
-    data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name of a cost, numbers) called
-        "references" and "weights", with the numbers of all knots in a row. Also "xs" and "us", with the states and
-        controls from which each variation starts, the numbers of all knots in a row.
-    start: the states and controls from which all variations start, unless `data` has their own.
+    data: arrays with a row for each variation: "x0" (V, nx), and lists of pairs (name, numbers): "references" and
+        "weights" of costs, with the numbers of all knots in a row; "contacts", placements (V, 3) or (V, 16). Also
+        "xs" and "us", the states and controls of a start for each variation, in a row.
+    start: the states and controls from which all variations start; None if `data` has a start for each variation.
     vary: None, or a function of the problem and an item that changes the problem or returns another one.
     items: the arguments of `vary`.
     keep: the arrays of each solution to keep.

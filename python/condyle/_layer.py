@@ -223,7 +223,7 @@ def _source(problem: Any, names: Sequence[str], own: Mapping[str, ArrayLike] | N
         raise TypeError("own: expected the nominal values of the parameters of the function `problem`, by name")
     if unknown := set(own) - set(names):
         raise ValueError(f"own: expected names in parameters, found {sorted(unknown)}")
-    if taken := [name for name in own if "/" in name or name in ("x0", "duration")]:
+    if taken := [name for name in own if "/" in name or name in ("x0", "duration", "gravity", "armature")]:
         raise ValueError(f"own: expected names that no other parameter has, without '/', found {taken}")
     values = {}
     for name, value in own.items():

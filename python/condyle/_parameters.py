@@ -133,11 +133,13 @@ class Parameter:
         elif kind in NUMBERS and not by_knot and name in (sizes := problem.parameters()):
             shape = () if kind == "friction" else (sizes[name],)
         else:
-            raise ValueError(
-                "parameters: expected a name in problem.parameters() or in own, which may differ by knot only for "
-                f"'target/NAME', 'weight/NAME', 'entry_weights/NAME' and 'duration', found {name!r}"
-                f"{' by knot' if by_knot else ''}"
-            )
+            if by_knot:
+                raise ValueError(
+                    "by_knot: expected 'target/NAME', 'weight/NAME' or 'entry_weights/NAME' of a cost, or 'duration', "
+                    f"found {name!r}"
+                )
+            known = ", ".join(map(repr, problem.parameters()))
+            raise ValueError(f"parameters: expected {known}, or a name in own, found {name!r}")
         self.shape: _Shape = (self._knots, *shape) if by_knot else shape
         """The shape of one value."""
 

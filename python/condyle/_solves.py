@@ -280,7 +280,7 @@ class Solves:
             "xs": np.stack([np.ravel(starts[i][0]) for i in indices]),
             "us": np.stack([flat(starts[i][1]) for i in indices]),
         }
-        given = (self.solver, n, data, None, (vary, indices), ["xs", "us", "K"], self._threads, False, None)
+        given = (self.solver, n, data, None, (vary, indices), ["xs", "us", "K"], self._threads, None)
         try:
             columns, wrong = _solve_many(*given)
         except ProblemError as error:

@@ -54,6 +54,16 @@ def test_gradients_equal_differences_with_active_bounds() -> None:
     check_grads(function, values, order=1, modes=["rev"], eps=5e-5, atol=1e-5, rtol=1e-5)
 
 
+def test_numbers_of_the_robot() -> None:
+    problem = arm_problem(1e3)
+    inertia, gravity = (jnp.array(problem.parameter(name)) for name in ("inertia/link4", "gravity"))
+    layer = ProblemLayer(problem, ["inertia/link4", "gravity"])
+    values = (jnp.ones(10), jnp.ones(3))
+    check_grads(
+        lambda a, b: loss(layer(a * inertia, b * gravity)), values, 1, modes=["rev"], eps=5e-5, atol=1e-5, rtol=1e-5
+    )
+
+
 def test_transformations() -> None:
     layer = ProblemLayer(arm_problem(1e3), ["target/reach", "weight/reach"])
     goals = jnp.array([GOAL, GOAL + 0.05])
@@ -84,15 +94,15 @@ def test_warm_starts_are_kept() -> None:
 
 
 def test_durations_and_parameters_of_ones_own() -> None:
-    def make(armature: Any) -> Problem:
-        model = ARM.with_armature(np.full(7, armature))
+    def make(rotors: Any) -> Problem:
+        model = ARM.with_armature(np.full(7, rotors))
         rest, effort = Cost("rest", 0.2, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
         reach = Cost("reach", 20.0, Residual.frame_translation(model, "tool", GOAL))
         knot = FreeDynamics(model, 0.05, [rest, effort, reach])
         return Problem(X0, [knot], [0] * KNOTS, FreeDynamics(model, None, [rest, reach]))
 
-    layer = ProblemLayer(make, ["armature", "duration"], own={"armature": 0.2}, threads=2)
-    function = jax.jit(lambda scale, armature: loss(layer(armature, 0.05 * scale)))
+    layer = ProblemLayer(make, ["rotors", "duration"], own={"rotors": 0.2}, threads=2)
+    function = jax.jit(lambda scale, rotors: loss(layer(rotors, 0.05 * scale)))
     check_grads(function, (1.0, jnp.array([0.2, 0.3])), order=1, modes=["rev"], eps=5e-5, atol=1e-5, rtol=1e-5)
 
 

@@ -332,7 +332,7 @@ def test_errors_of_a_call(call: Any, error: type[Exception], message: str) -> No
 
 def test_errors_of_construction() -> None:
     problem = arm_problem()
-    with pytest.raises(ValueError, match="parameters: expected 'x0' .*, found 'mass'"):
+    with pytest.raises(ValueError, match="parameters: expected 'x0', .*, or a name in own, found 'mass'"):
         ProblemLayer(problem, ["mass"])
     with pytest.raises(KeyError, match="no knot has a cost 'grasp'"):
         ProblemLayer(problem, ["target/grasp"])

@@ -32,20 +32,20 @@ REACH = torch.tensor(GOAL)
 FEET = ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
 
 
-def made(armature: Any, goal: Any) -> Problem:
+def made(rotors: Any, goal: Any) -> Problem:
     """Returns a problem of an arm with rotors: a number for all joints, and a second one for the last joint."""
-    model = ARM.with_armature(np.full(7, 0.1 + 0.1 * armature[0]) + np.eye(7)[6] * armature[1])
+    model = ARM.with_armature(np.full(7, 0.1 + 0.1 * rotors[0]) + np.eye(7)[6] * rotors[1])
     rest, effort = Cost("rest", 0.2, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
     reach = Cost("reach", 20.0, Residual.frame_translation(model, "tool", goal))
     knot = FreeDynamics(model, 0.05, [rest, effort, reach], lower=np.full(7, -26.0), upper=np.full(7, 26.0))
     return Problem(X0, [knot], [0] * KNOTS, FreeDynamics(model, None, [rest, reach]))
 
 
-NOMINAL = {"armature": [0.5, 0.2], "goal": GOAL}
+NOMINAL = {"rotors": [0.5, 0.2], "goal": GOAL}
 
 
 def own_layer(**settings: Any) -> ProblemLayer:
-    return ProblemLayer(made, ["armature", "weight/effort", "goal"], own=NOMINAL, **settings)
+    return ProblemLayer(made, ["rotors", "weight/effort", "goal"], own=NOMINAL, **settings)
 
 
 def test_durations() -> None:
@@ -99,11 +99,25 @@ def test_contacts_and_durations_of_a_quadruped() -> None:
     assert slope.abs().max() > 1e-4
 
 
+def test_numbers_of_the_robot_and_bounds() -> None:
+    problem = arm_problem()
+    names = ["inertia/link4", "gravity", "armature", "bounds/upper"]
+    at = [problem.parameter(name) for name in names]
+    at[2] = np.full(7, 0.1)
+    layer = ProblemLayer(problem, names)
+
+    def function(*scales: Any) -> Any:
+        return loss(*layer(*(torch.tensor(value) * scale for value, scale in zip(at, scales, strict=True))))
+
+    assert (layer(*at)[1] == 26.0).any()
+    check(function, *(torch.ones(len(value)).double().requires_grad_() for value in at))
+
+
 def test_parameters_of_ones_own() -> None:
-    layer, armature, weight = own_layer(), torch.tensor([0.5, 0.3]).double(), torch.tensor(1.0).double()
-    check(lambda p: loss(*layer(p, 1e-3 * weight, REACH)), armature.clone().requires_grad_())
-    check(lambda p: loss(*layer(armature, 1e-3 * p, REACH)), weight.clone().requires_grad_())
-    check(lambda p: loss(*layer(armature, 1e-3 * weight, p)), REACH.clone().requires_grad_())
+    layer, rotors, weight = own_layer(), torch.tensor([0.5, 0.3]).double(), torch.tensor(1.0).double()
+    check(lambda p: loss(*layer(p, 1e-3 * weight, REACH)), rotors.clone().requires_grad_())
+    check(lambda p: loss(*layer(rotors, 1e-3 * p, REACH)), weight.clone().requires_grad_())
+    check(lambda p: loss(*layer(rotors, 1e-3 * weight, p)), REACH.clone().requires_grad_())
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -160,7 +174,7 @@ def test_copies_keep_warm_starts() -> None:
         assert torch.allclose(xs, layer(goals + 1e-3)[0], atol=1e-7)
         assert other._solves.problem is not layer._solves.problem
     again = pickle.loads(pickle.dumps(own_layer(on_failure="nan")))
-    assert again.parameters == ["armature", "weight/effort", "goal"]
+    assert again.parameters == ["rotors", "weight/effort", "goal"]
 
 
 def test_threads_share_a_layer() -> None:
@@ -186,7 +200,7 @@ def test_threads_share_a_layer() -> None:
     assert not failed
 
 
-def nobody(armature: Any) -> Any:
+def nobody(rotors: Any) -> Any:
     return None
 
 
@@ -234,14 +248,14 @@ def nobody(armature: Any) -> Any:
         ),
         (("problem", ["x0"], {"own": {"x": 1.0}}), TypeError, "problem: expected a function of the parameters in own"),
         ((made, ["x0"]), TypeError, "own: expected the nominal values of the parameters of the function `problem`"),
-        ((made, ["goal"], {"own": NOMINAL}), ValueError, "own: expected names in parameters, found ['armature']"),
+        ((made, ["goal"], {"own": NOMINAL}), ValueError, "own: expected names in parameters, found ['rotors']"),
         (
-            (nobody, ["armature"], {"own": {"armature": np.nan}}),
+            (nobody, ["rotors"], {"own": {"rotors": np.nan}}),
             ValueError,
-            "own: expected finite numbers for 'armature'",
+            "own: expected finite numbers for 'rotors'",
         ),
         (
-            (nobody, ["armature"], {"own": {"armature": 1.0}}),
+            (nobody, ["rotors"], {"own": {"rotors": 1.0}}),
             TypeError,
             "problem: expected a function that returns a Problem, found NoneType",
         ),
