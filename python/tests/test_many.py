@@ -38,6 +38,11 @@ def held() -> tuple[np.ndarray, np.ndarray]:
     return xs, reach().quasi_static(xs)
 
 
+def assert_near(found: Any, expected: Any, name: str) -> None:
+    """Asserts that two results of `Fddp` differ by rounding at most: together, sweeps have another order of sums."""
+    assert np.abs(found - expected).max() <= 1e-11 * (1.0 + np.abs(expected).max()), name
+
+
 @pytest.mark.parametrize("threads", [1, 3])
 def test_rows_are_single_solves(threads: int) -> None:
     rng, start = np.random.default_rng(3), held()
@@ -60,9 +65,10 @@ def test_rows_are_single_solves(threads: int) -> None:
         xs = start[0].copy()
         xs[0] = x0s[i]
         alone = Fddp(problem).solve(xs, start[1])
-        assert (found.status[i], found.iterations[i], found.cost[i]) == (alone.status, len(alone.trace), alone.cost)
+        assert (found.status[i], found.iterations[i]) == (alone.status, len(alone.trace))
+        assert_near(found.cost[i], alone.cost, "cost")
         for name in ("xs", "us", "K", "k"):
-            assert np.array_equal(getattr(found, name)[i], getattr(alone, name)), name
+            assert_near(getattr(found, name)[i], getattr(alone, name), name)
 
 
 def test_the_problem_is_not_changed() -> None:
@@ -190,7 +196,7 @@ def test_each_problem_has_a_start() -> None:
             problem.set_x0(x0)
             assert first.xs is not None and first.us is not None
             alone = Fddp(problem).solve(first.xs[i], first.us[i])
-            assert np.array_equal(found.xs[i], alone.xs)
+            assert_near(found.xs[i], alone.xs, "xs")
             assert found.iterations[i] == len(alone.trace)
     assert len(solve_many(reach(), start=first).cost) == 6  # the starts alone determine the number of problems
 

@@ -72,10 +72,11 @@ def test_rows_are_single_solves() -> None:
         begin[0] = x0
         alone = Fddp(problem).solve(begin, start.us)
         assert found.status[i] == alone.status == "converged"
-        assert (found.cost[i], found.iterations[i]) == (alone.cost, len(alone.trace))
+        assert found.iterations[i] == len(alone.trace)
         assert np.array_equal(found.xs[i, 0], x0)
-        for name in ("xs", "us", "K", "k"):
-            assert np.array_equal(getattr(found, name)[i], getattr(alone, name)), name
+        for name in ("cost", "xs", "us", "K", "k"):  # up to rounding: together, sweeps have another order of sums
+            expected = np.array(getattr(alone, name))
+            assert np.abs(getattr(found, name)[i] - expected).max() <= 1e-11 * (1.0 + np.abs(expected).max()), name
     assert not found.error.any()
 
 
