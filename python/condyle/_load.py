@@ -30,7 +30,7 @@ def load(name: str, package: str | None = None, root_joint: str | None = None) -
     installed = [one for one in PACKAGES if package in (None, one) and find_spec(one)]
     if not installed:
         expected = " or ".join([package] if package else PACKAGES)
-        raise ImportError(f"load: expected an installed package with files of robots: pip install {expected}")
+        raise ImportError(f"load: the files of robots are in the package {expected}, which is not installed")
     for one in installed:
         model = _example(name, root_joint) if one == "example_robot_data" else _described(name, root_joint)
         if model is not None:

@@ -87,7 +87,6 @@ fn pairs_that_are_too_near_move_apart() {
     assert!(before > 0.02 - CURVED, "{before}");
 }
 
-/// Two obstacles squeeze the tool from both sides: it cannot leave both at once, but it does not come nearer.
 /// Checks that steps take into account how an obstacle moves.
 #[test]
 fn an_obstacle_that_comes_nearer_is_kept_at_a_distance() {
@@ -118,6 +117,7 @@ fn an_obstacle_that_comes_nearer_is_kept_at_a_distance() {
     assert!(unknown < known - 5e-3, "{unknown} without the velocity, {known} with it");
 }
 
+/// Two obstacles squeeze the tool from both sides: it cannot leave both at once, but it does not come nearer.
 #[test]
 fn contradictory_distances_are_relaxed() {
     let model = robots::arm7();
@@ -125,7 +125,8 @@ fn contradictory_distances_are_relaxed() {
     let tool = model.frame("tool").unwrap();
     let at = forward_kinematics(&model, &mut Data::new(&model), &q).frame(tool).translation;
     let squeeze = [Vec3::new(0.05, 0.0, 0.0), Vec3::new(-0.05, 0.0, 0.0)];
-    let pairs = squeeze.map(|by| GeometryPair::new(ball("tool", 0.04), obstacle(at + by, 0.06))).to_vec();
+    let mut pairs = squeeze.map(|by| GeometryPair::new(ball("tool", 0.04), obstacle(at + by, 0.06))).to_vec();
+    pairs[1].second = pairs[1].second.clone().named("other obstacle");
     let mut ik = arm(pairs.clone());
     let targets = ik.hold(&q).unwrap();
     let mut next = q.clone();
@@ -180,8 +181,10 @@ fn starts_push_pairs_apart() {
     for k in 0..8 {
         let (sin, cos) = (f64::from(k) * core::f64::consts::FRAC_PI_4).sin_cos();
         let at = Se3::new(Mat3::identity(), Vec3::new(0.4 * cos, 0.4 * sin, 0.6));
-        let post = Geometry::in_world(Shape::Box { half_sizes: Vec3::new(0.03, 0.03, 0.4) }).named("post").at(at);
-        pairs.extend(["link4", "link5", "link6", "tool"].map(|n| GeometryPair::new(ball(n, 0.06), post.clone())));
+        let post = Geometry::in_world(Shape::Box { half_sizes: Vec3::new(0.03, 0.03, 0.4) }).at(at);
+        let post = post.named(format!("post {k}"));
+        let ball = |frame: &str| ball(frame, 0.06).named(format!("ball of {frame}"));
+        pairs.extend(["link4", "link5", "link6", "tool"].map(|n| GeometryPair::new(ball(n), post.clone())));
     }
     let (mut rng, mut data) = (StdRng::seed_from_u64(3), Data::new(&model));
     let tool = model.frame("tool").unwrap();

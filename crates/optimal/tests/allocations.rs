@@ -170,8 +170,9 @@ fn a_gait_allocates_nothing() {
     let contact = || "LF_foot".to_owned();
     let leg = |frame: &str| Geometry::on(frame, Shape::sphere([0.0; 3], 0.03));
     let legs = ["LF_foot", "RF_foot", "LH_foot"].map(|frame| GeometryPair::new(leg(frame), leg("RH_foot")));
-    let ball = Geometry::in_world(Shape::sphere([0.4, 0.0, 0.2], 0.1));
-    let pairs = [legs.to_vec(), vec![GeometryPair::new(leg("LF_foot"), ball); 7]].concat(); // more than one slot
+    let ball = |k: u8| Geometry::in_world(Shape::sphere([0.4, 0.1 * f64::from(k), 0.2], 0.1));
+    let balls = (0..7).map(|k| GeometryPair::new(leg("LF_foot"), ball(k)));
+    let pairs: Vec<_> = legs.into_iter().chain(balls).collect(); // more than one slot
     let target = Motion::zero();
     let reference = ReferenceFrame::LocalWorldAligned;
     let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
