@@ -4604,10 +4604,11 @@ class Problem:
         parameter: the name of the parameter, see `parameters`.
         values: the vector, as `parameter` returns it.
 
-        Numbers of a robot are checked as `ModelBuilder.build` checks them. They replace the robot of this problem
-        alone, and take longer to set than other parameters, because workspaces are allocated again.
+        Numbers of a robot replace the robot of this problem alone. They take longer to set than other parameters,
+        because workspaces are allocated again.
 
-        Raises `ProblemError` if the parameter does not exist, or for a wrong size or invalid numbers.
+        Raises `ProblemError` if the parameter does not exist, for a wrong size or invalid numbers, for an inertia that
+        no body has, and if the inertia matrix becomes singular.
         """
 
     def set_parameters(self, values: Mapping[str, ArrayLike]) -> None:

@@ -120,6 +120,8 @@ class Solves:
                 added = value if change is None or change[0] != k else value + change[1].reshape(value.shape)
                 own[parameter.name] = added.copy()
         problem = checked(self._build(**own), "problem: expected a function that returns a Problem")
+        if problem is self.problem:
+            raise ValueError("problem: expected a function that returns a new Problem at each call")
         for size, expected in self._dimensions.items():
             if (found := getattr(problem, size)) != expected:
                 raise ValueError(

@@ -140,7 +140,8 @@ def sweep_chunks(
     """Solves variations of a problem as `sweep` does, and yields the results of each chunk, in the order of the
     variations. Only a few chunks are in memory at a time, so millions of variations of an iterator can be solved.
 
-    The arguments are the arguments of `sweep`. A chunk is solved when the caller asks for its results. On a cluster,
+    The arguments are the arguments of `sweep`. A chunk is solved when the caller asks for its results, with the problem
+    and the variations as they are then. On a cluster,
     workers solve the next chunks meanwhile. With `folder`, each chunk is also written to a file, and finished chunks
     are read from the folder. An iterator must then yield the same variations in each call.
 

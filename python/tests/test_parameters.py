@@ -1,6 +1,8 @@
 """Parameters of a problem: vectors with names that are set without building the problem again."""
 
+import copy
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -114,6 +116,78 @@ def test_gradients_with_respect_to_numbers_of_the_robot() -> None:
     sensitivity.define("own gravity", 3, build)
     assert np.allclose(gradient, sensitivity.gradient("own gravity", by_us=by_us), rtol=1e-6, atol=1e-8)
     assert np.array_equal(problem.parameter("gravity"), [0.0, 0.0, -9.81])
+
+
+def gradient_of_controls(problem: Problem, name: str) -> np.ndarray:
+    """Returns the gradient of the sum of all controls with respect to a parameter, with exact curvature."""
+    start = np.tile(problem.x0, (problem.horizon + 1, 1))
+    solver = Fddp(problem, max_iterations=500, tolerance=1e-14)
+    assert solver.solve(start, problem.quasi_static(start)).status == "converged"
+    nu = problem.parameters()["bounds/lower"]
+    return Sensitivity(solver, tolerance=1e-3).gradient(name, by_us=np.ones((problem.horizon, nu)))
+
+
+@pytest.mark.parametrize("inertia", [np.zeros(10), np.r_[0.1, np.zeros(9)], np.r_[np.zeros(4), 1e-3 * np.eye(6)[0]]])
+def test_links_without_mass_or_extent_have_gradients(inertia: np.ndarray) -> None:
+    arm = condyle.robots.arm7().with_armature(np.full(7, 0.1))
+    name = f"inertia/{arm.body_names[7]}"
+    found = []
+    for added in (np.zeros(10), np.r_[1e-4, 0.0, 0.0, 0.0, 1e-6 * np.array([1.0, 0.0, 1.0, 0.0, 0.0, 1.0])]):
+        problem = arm_problem(arm, -200.0)
+        problem.set_parameter("bounds/upper", np.full(7, 200.0))
+        if inertia[4] > 0.0:
+            inertia = np.r_[inertia[:4], 1e-3, 0.0, 1e-3, 0.0, 0.0, 1e-3]
+        problem.set_parameter(name, inertia + added)
+        found.append(gradient_of_controls(problem, name))
+    assert np.abs(found[1]).min() > 0.0
+    assert np.allclose(found[0], found[1], rtol=0.02, atol=1e-3 * np.abs(found[1]).max())
+
+
+def test_gradients_by_armature_without_armature() -> None:
+    arm = condyle.robots.arm7()
+    assert not arm.armature.any()
+    found = [gradient_of_controls(arm_problem(arm.with_armature(np.full(7, x))), "armature") for x in (0.0, 1e-6)]
+    assert np.allclose(found[0], found[1], rtol=1e-3, atol=1e-4 * np.abs(found[1]).max())
+
+
+def test_armature_of_a_free_joint() -> None:
+    robot = condyle.robots.quadruped()
+    x0 = np.r_[condyle.neutral(robot), np.zeros(robot.nv)]
+    costs = [Cost("rest", 1.0, Residual.state(x0)), Cost("effort", 0.1, Residual.control(np.ones(12)))]
+    knot = FreeDynamics(robot, 0.02, costs, lower=np.full(12, -90.0), upper=np.full(12, 90.0))
+    gradient = gradient_of_controls(Problem(x0, [knot] * 3, None, FreeDynamics(robot, None, costs[:1])), "armature")
+    assert gradient.shape == (18,) and np.isfinite(gradient).all() and gradient[6:].all()
+    assert gradient[0] == gradient[1] == gradient[2]
+
+
+def test_impossible_inertias() -> None:
+    arm = condyle.robots.arm7()
+    problem, name = arm_problem(arm), f"inertia/{arm.body_names[7]}"
+    before = problem.parameter(name)
+    for inertia, match in (
+        ([1, 0, 0, 0, -1, 0, 0.1, 0, 0, 0.1], "a principal moment of inertia is -1"),
+        ([1, 0, 0, 0, 1, 0, 10, 0, 0, 1], "break the triangle inequality"),
+        ([0, 1, 0, 0, 0.1, 0, 0.1, 0, 0, 0.1], "has no mass and a first moment of mass"),
+        (np.zeros(10), "the inertia matrix is singular"),
+    ):
+        with pytest.raises(ProblemError, match=f"parameter `{name}`: .*{match}"):
+            problem.set_parameter(name, inertia)
+        assert np.array_equal(problem.parameter(name), before)
+    with pytest.raises(ProblemError, match="parameter `gravity`: `numbers\\[0\\]` is NaN"):
+        problem.set_parameter("gravity", [np.nan] * 3)
+
+
+def test_variations_do_not_change_the_problem() -> None:
+    problem = arm_problem(condyle.robots.arm7())
+
+    def vary(problem: Problem, gravity: float) -> None:
+        problem.set_parameter("gravity", [0.0, 0.0, gravity])
+        problem.set_parameter("bounds/upper", np.full(7, 35.0))
+
+    condyle.sweep(problem, [-3.0, -2.0], vary=vary)
+    for same in (problem, copy.deepcopy(problem), pickle.loads(pickle.dumps(problem))):
+        assert np.array_equal(same.parameter("gravity"), [0.0, 0.0, -9.81])
+        assert np.array_equal(same.parameter("bounds/upper"), np.full(7, 40.0))
 
 
 def test_friction() -> None:

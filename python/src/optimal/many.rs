@@ -290,8 +290,10 @@ impl Many<'_> {
         };
         let result: PyResult<Option<Py<Problem>>> = Python::attach(|py| {
             exchange(self.shell, problem)?;
+            let described = lock("problem", &self.shell.get().described)?.clone();
             let result = items.bind(py).get_item(i).and_then(|item| vary.call1(py, (self.shell, item)));
             exchange(self.shell, problem)?;
+            *lock("problem", &self.shell.get().described)? = described; // `vary` may have changed the descriptions
             let result = result?;
             if result.is_none(py) || result.is(self.shell) {
                 return Ok(None);

@@ -200,7 +200,9 @@ impl Nudge {
                 }
                 problem.change_friction(&self.name, &mut |cone| cone.mu = mu)
             }
-            Kind::Robot(kind) => problem.change_robots(&mut |model| replaced(kind, model, numbers))?,
+            Kind::Robot(kind) => problem.change_robots(&mut |model| {
+                kind.checked(model, numbers).map(Arc::new).map_err(|what| wrong(kind, what))
+            })?,
         };
         Ok(())
     }
@@ -272,8 +274,11 @@ impl Nudge {
                 let mut robots = self.robots.iter();
                 problem.change_robots(&mut |_| {
                     let (own, mut numbers) = (robots.next().expect("the visits are the same"), next().clone());
-                    numbers[entry] += step;
-                    if step == 0.0 { Ok(own.clone()) } else { replaced(kind, own, &numbers) }
+                    if step == 0.0 {
+                        return Ok(own.clone());
+                    }
+                    kind.move_by(own, &mut numbers, entry, step);
+                    kind.with(own, &numbers).map(Arc::new).map_err(|error| wrong(kind, error.to_string()))
                 })?
             }
         };
@@ -286,14 +291,14 @@ impl Nudge {
     }
 }
 
-/// Returns the robot with other numbers, in the memory of a problem.
-fn replaced(kind: &RobotNumbers, model: &Model, numbers: &[f64]) -> Result<Arc<Model>, Error> {
+/// Returns the error for numbers of a robot that are not valid.
+fn wrong(kind: &RobotNumbers, what: String) -> Error {
     let name = match kind {
         RobotNumbers::Inertia(link) => format!("inertia/{link}"),
         RobotNumbers::Gravity => "gravity".to_owned(),
         RobotNumbers::Armature => "armature".to_owned(),
     };
-    kind.with(model, numbers).map(Arc::new).map_err(|error| Error::Parameter { name, what: error.to_string() })
+    Error::Parameter { name, what }
 }
 
 /// Returns the error for a cost without the given property.

@@ -7,7 +7,7 @@ use super::residuals::residual::Residual;
 use crate::problem::innermost;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::inertial_parameters::{from_inertia, to_inertia};
-use condyle_dynamics::{Inertia, Model, Vec3};
+use condyle_dynamics::{Body, Inertia, Joint, Model, Vec3, Warning, WarningKind};
 use std::sync::Arc;
 
 /// Numbers of a robot's model that are a parameter.
@@ -33,26 +33,58 @@ impl RobotNumbers {
     }
 
     /// Returns a size of each number, to which the step of a difference is proportional. For inertial parameters it
-    /// follows from the mass and the inertia of the link, whose entries may be zero.
+    /// follows from the mass and the inertia of the link. The sizes have lower bounds, because rounding errors are
+    /// relative to the inertia matrix of the robot.
     pub(crate) fn scales(&self, numbers: &[f64]) -> Vec<f64> {
         match (self, numbers) {
             (Self::Inertia(_), [m, hx, hy, hz, xx, _, yy, _, _, zz]) => {
-                let inertia = (xx + yy + zz).max(f64::MIN_POSITIVE);
-                let length = (inertia / m.max(f64::MIN_POSITIVE)).sqrt();
-                let moment = (m * length).max(hx.abs()).max(hy.abs()).max(hz.abs());
-                let scale = |k: usize| {
-                    if k == 0 {
-                        *m
-                    } else if k < 4 {
-                        moment
-                    } else {
-                        inertia
-                    }
-                };
+                let (mass, inertia) = (m.max(0.1), (xx + yy + zz).max(1e-3));
+                let moment = (mass * inertia).sqrt().max(hx.abs()).max(hy.abs()).max(hz.abs());
+                let scale = |k: usize| [mass, moment, inertia][usize::from(k > 0) + usize::from(k > 3)];
                 (0..10).map(scale).collect()
             }
-            (Self::Armature, _) => numbers.iter().map(|x| if *x > 0.0 { *x } else { 1e-3 }).collect(),
+            (Self::Armature, _) => numbers.iter().map(|x| x.max(1e-3)).collect(),
             _ => vec![1.0; numbers.len()],
+        }
+    }
+
+    /// Moves one of the numbers of a robot by a step of a difference. A mass or an armature near zero moves from
+    /// |step|, because it must not be negative. The three equal armatures of a free joint along its linear coordinates
+    /// move together, each by a third of the step.
+    pub(crate) fn move_by(&self, model: &Model, numbers: &mut [f64], entry: usize, step: f64) {
+        let free = |body: &&Body| body.joint == Joint::FreeFlyer && (body.idx_v..body.idx_v + 3).contains(&entry);
+        match (self, model.bodies()[1..].iter().find(free)) {
+            (Self::Armature, Some(body)) => {
+                for x in &mut numbers[body.idx_v..body.idx_v + 3] {
+                    *x = x.max(step.abs()) + step / 3.0;
+                }
+            }
+            (Self::Armature, None) => numbers[entry] = numbers[entry].max(step.abs()) + step,
+            (Self::Inertia(_), _) if entry == 0 => numbers[0] = numbers[0].max(step.abs()) + step,
+            _ => numbers[entry] += step,
+        }
+    }
+
+    /// Returns the robot with other numbers, as [`with`](Self::with) does. The error says why the numbers are
+    /// impossible: a body has negative moments of inertia, or moments that break the triangle inequality, or a first
+    /// moment without mass, or the inertia matrix is singular. A robot that has this fault already may keep it.
+    pub(crate) fn checked(&self, model: &Model, numbers: &[f64]) -> Result<Model, String> {
+        if let (Self::Inertia(link), [0.0, h @ .., _, _, _, _, _, _]) = (self, numbers)
+            && h.iter().any(|h| *h != 0.0)
+        {
+            return Err(format!("body `{link}` has no mass and a first moment of mass"));
+        }
+        let new = self.with(model, numbers).map_err(|error| error.to_string())?;
+        let is_impossible = |warning: &&Warning| {
+            matches!(warning.kind(), WarningKind::Negative | WarningKind::Triangle | WarningKind::Singular)
+        };
+        let is_new = |warning: &&Warning| {
+            let same = |old: &Warning| old.kind() == warning.kind() && old.subject() == warning.subject();
+            !model.warnings().iter().any(same)
+        };
+        match new.warnings().iter().filter(is_impossible).find(is_new) {
+            Some(warning) => Err(warning.to_string()),
+            None => Ok(new),
         }
     }
 

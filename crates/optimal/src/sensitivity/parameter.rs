@@ -216,16 +216,17 @@ impl Problem {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Sensitivity`] if the problem does not have the parameter, [`Error::Length`] for another number of
-    /// entries, [`Error::Parameter`] for invalid bounds, friction or numbers of a robot, and the errors of the setter
-    /// of the parameter.
+    /// [`Error::Sensitivity`] if the problem does not have the parameter. [`Error::Parameter`] for another number of
+    /// entries, for numbers that are not finite, and for invalid bounds, friction or numbers of a robot: an inertia
+    /// must be physical, and the inertia matrix must not become singular. The errors of the setter of the parameter.
     pub fn set_parameter(&mut self, parameter: &Parameter, numbers: &[f64]) -> Result<(), Error> {
         let Some(nudge) = parameter.nudge(self)? else { return self.set_x0(numbers) };
         let expected = nudge.value_size();
-        match parameter.is_bound() {
-            true => Error::check_length("numbers", numbers.len(), expected)?, // bounds may be infinite
-            false => Error::check("numbers", numbers, expected)?,
-        }
+        let checked = match parameter.is_bound() {
+            true => Error::check_length("numbers", numbers.len(), expected), // bounds may be infinite
+            false => Error::check("numbers", numbers, expected),
+        };
+        checked.map_err(|error| Error::Parameter { name: parameter.to_string(), what: error.to_string() })?;
         nudge.set(self, numbers)
     }
 }

@@ -139,7 +139,7 @@ fn the_numbers_of_a_quadruped() {
 /// Checks that a parameter that is set gives the problem that is built with it, and that a reader gets it back.
 #[test]
 fn numbers_are_set_without_building() {
-    let p: Vec<f64> = (0..20).map(|k| 1e-3 * f64::from(k + 1)).collect();
+    let p: Vec<f64> = (0..20).map(|k| if k < 10 { 1e-5 } else { 1e-3 } * f64::from(k + 1)).collect();
     let (mut built, mut problem) = (reach(&p), reach(&[0.0; 20]));
     let all = built.parameters().unwrap();
     let names: Vec<String> = all.iter().map(|(parameter, _)| parameter.to_string()).collect();

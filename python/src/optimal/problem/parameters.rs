@@ -52,10 +52,11 @@ impl Problem {
     /// parameter: the name of the parameter, see `parameters`.
     /// values: the vector, as `parameter` returns it.
     ///
-    /// Numbers of a robot are checked as `ModelBuilder.build` checks them. They replace the robot of this problem
-    /// alone, and take longer to set than other parameters, because workspaces are allocated again.
+    /// Numbers of a robot replace the robot of this problem alone. They take longer to set than other parameters,
+    /// because workspaces are allocated again.
     ///
-    /// Raises `ProblemError` if the parameter does not exist, or for a wrong size or invalid numbers.
+    /// Raises `ProblemError` if the parameter does not exist, for a wrong size or invalid numbers, for an inertia that
+    /// no body has, and if the inertia matrix becomes singular.
     fn set_parameter(&self, parameter: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
         let (kind, values) = (named(parameter)?, numbers("values", values)?);
         let mut problem = lock("problem", &self.inner)?;
