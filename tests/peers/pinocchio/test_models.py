@@ -235,7 +235,7 @@ def test_by_name_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
         condyle.load("talos", root_joint="free_flyer")
     load: ModuleType = sys.modules["condyle._load"]
     monkeypatch.setattr(load, "find_spec", lambda name: None)
-    with pytest.raises(ImportError, match="the files of robots are in the package example_robot_data or robot_descriptions, which is not"):
+    with pytest.raises(ImportError, match="example_robot_data or robot_descriptions, which is not installed"):
         condyle.load("talos")
 
 

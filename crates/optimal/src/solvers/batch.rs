@@ -1,7 +1,7 @@
 //! Solution of many problems of one shape by FDDP, several at a time in the lanes of SIMD registers.
 
 use super::directions::{Directions, Seeker};
-use super::many::{ManyProblems, spread};
+use super::many::{ManyProblems, copy_start, spread};
 use super::rollout::{Nominal, SeveralProblems, Trials};
 use super::search::Search;
 use super::settings::Settings;
@@ -148,14 +148,7 @@ impl BatchFddp {
     /// # Errors
     /// [`Error`] if a length is wrong or a number is not finite. The old warm start is then kept.
     pub fn set_start(&mut self, xs: &[f64], us: &[f64]) -> Result<(), Error> {
-        let [old_xs, old_us] = &self.workers[0].start;
-        Error::check("xs", xs, old_xs.len())?;
-        Error::check("us", us, old_us.len())?;
-        for worker in &mut self.workers {
-            worker.start[0].copy_from_slice(xs);
-            worker.start[1].copy_from_slice(us);
-        }
-        Ok(())
+        copy_start(self.workers.iter_mut().map(|worker| &mut worker.start), xs, us)
     }
 
     /// Solves the problems 0 … `count` − 1. Returns the number of problems that were passed to

@@ -38,6 +38,21 @@ pub trait ManyProblems: Sync {
     }
 }
 
+/// Copies a nominal warm start to the storage of each thread, after a check of lengths and numbers.
+pub(super) fn copy_start<'a>(
+    starts: impl Iterator<Item = &'a mut [Vec<f64>; 2]>,
+    xs: &[f64],
+    us: &[f64],
+) -> Result<(), Error> {
+    for [own_xs, own_us] in starts {
+        Error::check("xs", xs, own_xs.len())?;
+        Error::check("us", us, own_us.len())?;
+        own_xs.copy_from_slice(xs);
+        own_us.copy_from_slice(us);
+    }
+    Ok(())
+}
+
 /// Distribution of the problems of a call among the threads.
 pub(super) struct Queue<'a, P, S> {
     pub(super) problems: &'a P,

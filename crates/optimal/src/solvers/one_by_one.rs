@@ -1,6 +1,6 @@
 //! Solution of many problems by any solver, one problem at a time on each thread.
 
-use super::many::{ManyProblems, Queue, spread};
+use super::many::{ManyProblems, Queue, copy_start, spread};
 use super::solution::{Iteration, Status};
 use super::start::quasi_static_start;
 use super::watch::Observer;
@@ -123,14 +123,7 @@ impl<S: SingleSolver> OneByOne<S> {
     /// # Errors
     /// [`Error`] if a length is wrong or a number is not finite. The old warm start is then kept.
     pub fn set_start(&mut self, xs: &[f64], us: &[f64]) -> Result<(), Error> {
-        let [old_xs, old_us] = &self.workers[0].start;
-        Error::check("xs", xs, old_xs.len())?;
-        Error::check("us", us, old_us.len())?;
-        for worker in &mut self.workers {
-            worker.start[0].copy_from_slice(xs);
-            worker.start[1].copy_from_slice(us);
-        }
-        Ok(())
+        copy_start(self.workers.iter_mut().map(|worker| &mut worker.start), xs, us)
     }
 
     /// Solves the problems 0 … `count` − 1. Returns the number of problems that were passed to
