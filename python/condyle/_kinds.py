@@ -5,6 +5,7 @@ these functions by `Functions`, and so are the same for both frameworks.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from ._operations import Operation, Slot
@@ -88,14 +89,8 @@ def pull_along(
 
     arrays: the arguments of `pull`; moved, changed: the tangents ẋ and λ̇ without symbols, or None for zeros.
     """
-    x, cotangents, known = cut_pull(operation, arrays)
-    total = None if changed is None else functions.pull(operation, needed, *x, *changed, *known)
-    if moved is None:
-        return total
-    if not operation.twice:
-        raise operation.only_once()
-    bent = functions.bend(operation, needed, *x, *cotangents, *moved)
-    return bent if total is None else _sum(total, bent)
+    first, second = partial(functions.pull, operation, needed), partial(functions.bend, operation, needed)
+    return _along(first, second, operation, cut_pull(operation, arrays), moved, changed)
 
 
 def push_along(
@@ -105,14 +100,22 @@ def push_along(
 
     arrays: the arguments of `push`; moved, changed: the tangents ẏ and ẍ without symbols, or None for zeros.
     """
-    x, along, known = cut_push(operation, arrays)
-    total = None if changed is None else functions.push(operation, needed, *x, *changed, *known)
+    first, second = partial(functions.push, operation, needed), partial(functions.curve, operation, None)
+    return _along(first, second, operation, cut_push(operation, arrays), moved, changed)
+
+
+def _along(
+    first: Any, second: Any, operation: Operation, parts: tuple[Arrays, Arrays, Arrays], moved: Any, changed: Any
+) -> Arrays | None:
+    """Returns second(x, λ, ẋ) + first(x, λ̇) for a function first(x, λ) that is linear in λ; None if it is zero."""
+    x, factors, known = parts
+    total = None if changed is None else first(*x, *changed, *known)
     if moved is None:
         return total
     if not operation.twice:
         raise operation.only_once()
-    curved = functions.curve(operation, None, *x, *along, *moved)
-    return curved if total is None else _sum(total, curved)
+    bent: Arrays = second(*x, *factors, *moved)
+    return bent if total is None else _sum(total, bent)
 
 
 def _sum(a: Arrays, b: Arrays) -> tuple[Any, ...]:

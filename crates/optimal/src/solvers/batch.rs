@@ -1,6 +1,6 @@
 //! Solution of many problems of one shape by FDDP, several at a time in the lanes of SIMD registers.
 
-use super::directions::{Directions, Seeker};
+use super::directions::{Directions, Member};
 use super::many::{ManyProblems, copy_start, spread};
 use super::rollout::{Nominal, SeveralProblems, Trials};
 use super::search::Search;
@@ -249,15 +249,15 @@ impl Worker {
     /// is swept alone, with a larger regularisation.
     fn find_directions<P: ManyProblems>(&mut self, queue: &Queue<'_, P>) {
         let Self { slots, linear, directions: Some(directions), .. } = self else { return };
-        let mut seekers = Vec::with_capacity(slots.len());
+        let mut members = Vec::with_capacity(slots.len());
         for Slot { problem, solver, task } in &mut *slots {
             let Some(task) = task.as_mut().filter(|task| task.waits) else { continue };
             if task.search.accepted {
                 task.now.merit.gap = solver.iterate.update_gaps(problem);
             }
-            seekers.push(Seeker { problem, solver, now: &mut task.now });
+            members.push(Member { problem, solver, now: &mut task.now });
         }
-        let mut found = directions.run(&mut seekers, |feasible| queue.settings.counts_gaps(feasible)).into_iter();
+        let mut found = directions.run(&mut members, |feasible| queue.settings.counts_gaps(feasible)).into_iter();
         for slot in slots {
             let Some(mut task) = slot.task.take_if(|task| task.waits) else { continue };
             match found.next().flatten() {

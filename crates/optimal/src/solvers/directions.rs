@@ -22,7 +22,7 @@ pub(super) struct Directions {
 }
 
 /// Problem whose search direction is computed, with its solver.
-pub(super) struct Seeker<'a> {
+pub(super) struct Member<'a> {
     pub(super) problem: &'a mut Problem,
     pub(super) solver: &'a mut SolverLoop,
     pub(super) now: &'a mut Progress,
@@ -43,31 +43,31 @@ impl Directions {
     /// of gaps if `counts_gaps` is false; `None` if the sweep failed.
     pub(super) fn run(
         &mut self,
-        seekers: &mut [Seeker<'_>],
+        members: &mut [Member<'_>],
         counts_gaps: impl Fn(bool) -> bool,
     ) -> [Option<[f64; 2]>; MOST_LANES] {
         let Self { sweep, knots, terminals } = self;
-        let (count, start, mut sweeping) = (seekers.len(), Instant::now(), Duration::ZERO);
-        let (horizon, width) = (seekers[0].problem.horizon(), knots.len());
-        for (seeker, knot) in seekers.iter_mut().zip(&mut *terminals) {
-            seeker.derive(horizon..horizon + 1, core::slice::from_mut(knot));
+        let (count, start, mut sweeping) = (members.len(), Instant::now(), Duration::ZERO);
+        let (horizon, width) = (members[0].problem.horizon(), knots.len());
+        for (member, knot) in members.iter_mut().zip(&mut *terminals) {
+            member.derive(horizon..horizon + 1, core::slice::from_mut(knot));
         }
-        let regularisation = lanes(seekers, |seeker| seeker.now.merit.regularisation);
+        let regularisation = lanes(members, |member| member.now.merit.regularisation);
         let ends: [&LqKnot; MOST_LANES] = core::array::from_fn(|lane| &terminals[lane.min(count - 1)]);
         sweep.begin(&ends[..count], &regularisation[..count]);
 
         let mut end = horizon;
         while end > 0 {
             let first = (end - 1) / width * width;
-            for (seeker, knots) in seekers.iter_mut().zip(&mut *knots) {
-                seeker.derive(first..end, &mut knots[..end - first]);
+            for (member, knots) in members.iter_mut().zip(&mut *knots) {
+                member.derive(first..end, &mut knots[..end - first]);
             }
             let clock = Instant::now();
             for t in (first..end).rev() {
                 let each: [&LqKnot; MOST_LANES] = core::array::from_fn(|lane| &knots[lane.min(count - 1)][t - first]);
                 let mut results: [LaneResult<'_>; MOST_LANES] = Default::default();
-                for (result, seeker) in results.iter_mut().zip(&mut *seekers) {
-                    *result = seeker.result(t);
+                for (result, member) in results.iter_mut().zip(&mut *members) {
+                    *result = member.result(t);
                 }
                 sweep.step(&each[..count], &mut results[..count]);
             }
@@ -76,12 +76,12 @@ impl Directions {
         }
 
         let clock = Instant::now();
-        let zeros = vec![0.0; seekers[0].problem.ndx()];
-        let feasible = lanes(seekers, |seeker| seeker.now.merit.feasible);
+        let zeros = vec![0.0; members[0].problem.ndx()];
+        let feasible = lanes(members, |member| member.now.merit.feasible);
         let mut curved: [&mut [f64]; MOST_LANES] = Default::default();
         let mut gaps = [&zeros[..]; MOST_LANES];
-        for (((curved, gap), seeker), feasible) in curved.iter_mut().zip(&mut gaps).zip(&mut *seekers).zip(feasible) {
-            let SolverLoop { iterate, line_search, .. } = &mut *seeker.solver;
+        for (((curved, gap), member), feasible) in curved.iter_mut().zip(&mut gaps).zip(&mut *members).zip(feasible) {
+            let SolverLoop { iterate, line_search, .. } = &mut *member.solver;
             if !feasible {
                 *gap = &iterate.gaps[..zeros.len()];
             }
@@ -90,11 +90,11 @@ impl Directions {
         let sums = sweep.end(&gaps[..count], &mut curved[..count]);
         sweeping += clock.elapsed();
         let deriving = (start.elapsed() - sweeping) / count as u32;
-        for seeker in &mut *seekers {
-            let timings = &mut seeker.solver.iterate.solution.timings;
+        for member in &mut *members {
+            let timings = &mut member.solver.iterate.solution.timings;
             timings.calc_diff += deriving;
             timings.sweep += sweeping / count as u32;
-            seeker.now.stores_gains();
+            member.now.stores_gains();
         }
         core::array::from_fn(|lane| {
             let [square, slope, curvature] = sums[lane]?;
@@ -106,7 +106,7 @@ impl Directions {
     }
 }
 
-impl Seeker<'_> {
+impl Member<'_> {
     /// Computes the derivatives at a range of knots.
     fn derive(&mut self, range: Range<usize>, knots: &mut [LqKnot]) {
         self.solver.calc_diff_part(self.problem, self.now, range, knots);
@@ -123,6 +123,6 @@ impl Seeker<'_> {
 }
 
 /// Returns a value of each problem.
-fn lanes<T: Copy + Default>(seekers: &[Seeker<'_>], of: impl Fn(&Seeker<'_>) -> T) -> [T; MOST_LANES] {
-    core::array::from_fn(|lane| seekers.get(lane).map(&of).unwrap_or_default())
+fn lanes<T: Copy + Default>(members: &[Member<'_>], of: impl Fn(&Member<'_>) -> T) -> [T; MOST_LANES] {
+    core::array::from_fn(|lane| members.get(lane).map(&of).unwrap_or_default())
 }

@@ -1,7 +1,7 @@
 //! Iterate of a solver: a trajectory with its dynamics, cost and gaps.
 
 use super::solution::Solution;
-use crate::problem::Problem;
+use crate::problem::{Evaluation, Problem};
 use crate::time::Instant;
 use condyle_linalg::max_abs;
 
@@ -54,6 +54,17 @@ impl Iterate {
             knows_motions: false,
             costs: vec![0.0; horizon + 1],
             gaps: vec![0.0; (horizon + 1) * shape.ndx],
+        }
+    }
+
+    /// Returns the derivatives that an iteration needs: equations of inverse dynamics, with the motions if they are
+    /// known, or derivatives of the next states.
+    pub(super) fn derivatives(&self, inverse_dynamics: bool) -> Evaluation<'_> {
+        match inverse_dynamics {
+            true => {
+                Evaluation::Equations { motions: if self.knows_motions { &self.motions } else { &[] }, rows: false }
+            }
+            false => Evaluation::Derivatives,
         }
     }
 

@@ -16,7 +16,7 @@ use super::solution::{Iteration, Solution, Status, Timings};
 use super::watch::{Clock, Phase, Watch};
 use crate::error::Error;
 use crate::lq::{LqKnot, Sweep, SweepError};
-use crate::problem::{ActionModel, Evaluation, Problem};
+use crate::problem::{ActionModel, Problem};
 use crate::time::Instant;
 use std::ops::Range;
 use std::time::Duration;
@@ -402,12 +402,10 @@ impl SolverLoop {
     ) -> Option<Result<(), SweepError>> {
         let clock = Instant::now();
         let follows = self.follows(settings);
-        let Self { iterate: Iterate { solution, gaps, motions, knows_motions, .. }, knots, sweep, .. } = self;
-        let what = match self.inverse_dynamics {
-            true => Evaluation::Equations { motions: if *knows_motions { motions } else { &[] }, rows: false },
-            false => Evaluation::Derivatives,
-        };
-        let (Solution { xs, us, .. }, shape) = (&*solution, solution.shape());
+        let Self { iterate, knots, sweep, inverse_dynamics, .. } = self;
+        let what = iterate.derivatives(*inverse_dynamics);
+        let Iterate { solution, gaps, .. } = &*iterate;
+        let (Solution { xs, us, .. }, shape) = (solution, solution.shape());
         let complete = |model: &dyn ActionModel, first: usize, knots: &mut [LqKnot]| {
             for (t, knot) in (first..).zip(knots) {
                 complete(model, t, knot, feasible, gaps.get(shape.dx(t + 1)), &us[shape.u(t)]);
@@ -448,11 +446,8 @@ impl SolverLoop {
         range: Range<usize>,
         lq_knots: &mut [LqKnot],
     ) {
-        let Iterate { solution: Solution { xs, us, .. }, gaps, motions, knows_motions, .. } = &self.iterate;
-        let what = match self.inverse_dynamics {
-            true => Evaluation::Equations { motions: if *knows_motions { motions } else { &[] }, rows: false },
-            false => Evaluation::Derivatives,
-        };
+        let Iterate { solution: Solution { xs, us, .. }, gaps, .. } = &self.iterate;
+        let what = self.iterate.derivatives(self.inverse_dynamics);
         problem.calc_diff_part(what, [xs, us], range.clone(), lq_knots);
         let shape = problem.shape();
         for (t, knot) in range.zip(lq_knots) {

@@ -96,16 +96,7 @@ impl Problem {
     /// support them.
     #[track_caller]
     pub(crate) fn calc_diff_as(&mut self, what: Evaluation<'_>, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
-        let horizon = self.horizon();
-        self.begin_derivatives(xs, us, lq_knots);
-        for (action, knots) in &self.runs {
-            let (x, u) = self.places(knots);
-            let mut results = Results::derivatives(&mut lq_knots[knots.clone()]);
-            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
-            evaluate(action, t, &xs[x], &us[u], what.part(knots.clone(), horizon), &mut results);
-        }
-        let (x, mut results) = (&xs[self.shape.x(horizon)], Results::derivatives(&mut lq_knots[horizon..]));
-        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], what.without_equations(), &mut results);
+        self.calc_diff_part(what, [xs, us], 0..self.horizon() + 1, lq_knots);
     }
 
     /// Computes the derivatives of [`calc_diff_as`](Self::calc_diff_as) at the knots of a range alone, into `lq_knots`.
@@ -161,7 +152,9 @@ impl Problem {
         gains: &mut [Gains],
         mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqKnot], &mut [KnotFeedback]) + Send,
     ) {
-        self.begin_derivatives(xs, us, lq_knots);
+        self.assert_trajectory(xs, us);
+        assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
+        clear(lq_knots);
         let Self { models, runs, copies, knots, shape, terminal, .. } = self;
         let t = shape.horizon();
         let ((lq_knots, end), (found, found_there)) = (lq_knots.split_at_mut(t), found.split_at_mut(t));
@@ -175,14 +168,6 @@ impl Problem {
     /// Copies the multipliers of the models into the copies of the models that other threads use.
     pub(crate) fn share_multipliers(&mut self) {
         self.copies.share_multipliers(&mut self.models.actions, &self.runs);
-    }
-
-    /// Checks the lengths, and clears the structures of A and B, which the actions then set again.
-    #[track_caller]
-    fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
-        self.assert_trajectory(xs, us);
-        assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
-        clear(lq_knots);
     }
 
     /// Returns for each knot the controls that hold its state still, as nearly as controls can achieve: see
@@ -251,7 +236,7 @@ impl Problem {
     }
 }
 
-/// Clears the structures of A and B, and the constraint rows.
+/// Clears the structures of A and B, and the constraint rows, which the actions then set again.
 fn clear(lq_knots: &mut [LqKnot]) {
     for knot in lq_knots {
         knot.structure.set_dense();

@@ -77,12 +77,12 @@ impl DynamicsKind {
 
     /// Returns whether two kinds differ at most in the targets of their contacts.
     pub(crate) fn is_alike(&self, other: &Self) -> bool {
-        let aimed_alike = |to: &Contact, from: &Contact| {
+        let same_contact = |to: &Contact, from: &Contact| {
             let constraint = ContactConstraint { target: from.constraint.target, ..to.constraint };
             to.name == from.name && constraint == from.constraint
         };
         let (own, others) = (self.contacts(), other.contacts());
-        let alike = || own.len() == others.len() && own.iter().zip(others).all(|(to, from)| aimed_alike(to, from));
+        let alike = || own.len() == others.len() && own.iter().zip(others).all(|(to, from)| same_contact(to, from));
         match (self, other) {
             (Self::Contact(_, own), Self::Contact(_, other)) => own == other && alike(),
             (Self::ContactInverse(_, own), Self::ContactInverse(_, other)) => own == other && alike(),

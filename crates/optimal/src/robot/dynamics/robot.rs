@@ -4,7 +4,7 @@
 mod across;
 mod curvature;
 
-use self::across::aimed;
+use self::across::with_targets;
 use super::batch::{DynamicsKind, Group, KnotBatch, LaneTerms, Long, Short};
 use super::group_kernel::BLOCK;
 use super::impact::Impact;
@@ -420,10 +420,10 @@ impl RobotDynamics {
         let (several, across) = (count > Short::LANES || what != Evaluation::Values, !each.is_empty());
         match vectors.as_mut().filter(|_| count >= WORTHWHILE || equations || across) {
             Some(VectorBatches { long: Some(long), .. }) if several || across => {
-                aimed(long, kind, each, |long| long.run(model, group, terms, data));
+                with_targets(long, kind, each, |long| long.run(model, group, terms, data));
             }
             Some(VectorBatches { short, .. }) => {
-                aimed(short, kind, each, |short| short.run(model, group, terms, data));
+                with_targets(short, kind, each, |short| short.run(model, group, terms, data));
             }
             None => {
                 for (k, data) in data.chunks_exact_mut(1).enumerate() {

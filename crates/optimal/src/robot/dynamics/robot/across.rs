@@ -35,7 +35,7 @@ impl RobotDynamics {
 
 /// Runs a batch in which each contact has the target of the lane's robot. `own` are the dynamics of the robot that
 /// computes the batch, and `each` the robots of the lanes; `None` stands for that robot.
-pub(super) fn aimed<S: Block<Number = f64>>(
+pub(super) fn with_targets<S: Block<Number = f64>>(
     batch: &mut KnotBatch<S>,
     own: &DynamicsKind,
     each: &[Option<&RobotDynamics>],
